@@ -1,0 +1,114 @@
+"""Baths on named boundaries, and the ways of imposing Donnan equilibrium there.
+
+The condition p = p_D(c̄, cfc), c = c_D(c̄, cfc), eqs. (23), depends on the deformation through cfc. A treatment says how it
+enters: weakly, as an efflux, or as prescribed values with a charge known before the step.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple, TypeAlias
+
+from ngsolve import CoefficientFunction
+
+from ngswell import donnan
+from ngswell.errors import InputError
+from ngswell.materials import Material
+from ngswell.schedules import Schedule, schedule
+
+
+class Site(NamedTuple):
+    """What a weak treatment sees on its boundary: the fields there, the bath, the material and the cell size h [mm]."""
+
+    p: CoefficientFunction
+    c: CoefficientFunction
+    cfc: CoefficientFunction
+    bath: CoefficientFunction
+    hydraulic: CoefficientFunction
+    material: Material
+    h: float
+
+
+@dataclass(frozen=True)
+class Penalty:
+    """Donnan equilibrium imposed weakly, the third terms of (27) and (32), with the sign that makes them coercive:
+
+        fluid efflux q̄ = ε (p − p_D),   cation efflux j̄ = ε (c − c_D)    per current area.
+
+    Give either the paper's raw ε (`Penalty(40.0)`: mm³/(N s) for p and mm/s for c, one number for both dimensions) or
+    `Penalty(relative=1e3)`: that multiple of K/h for p and of D₊/h for c, h being the size of the cells at the boundary.
+    """
+
+    epsilon: float | None = None
+    relative: float | None = None
+
+    def __post_init__(self) -> None:
+        if (self.epsilon is None) == (self.relative is None):
+            raise InputError("Penalty takes either epsilon, Penalty(40.0), or relative, Penalty(relative=1e3)")
+        value = self.epsilon if self.epsilon is not None else self.relative
+        if not (value is not None and 0 < value < float("inf")):
+            raise InputError(f"Penalty has to be positive and finite, got {value!r}")
+
+    def efflux(self, site: Site) -> tuple[CoefficientFunction, CoefficientFunction]:
+        """Fluid [mm/s] and cation [mol/l mm/s] efflux per current area."""
+        if self.relative is None:
+            for_p = for_c = self.epsilon
+        else:
+            for_p = self.relative * site.material.K / site.h
+            for_c = self.relative * site.material.D_plus / site.h
+        p_D = donnan.pressure(site.bath, site.cfc, site.material.RT, site.hydraulic)
+        return for_p * (site.p - p_D), for_c * (site.c - donnan.cations(site.bath, site.cfc))
+
+
+@dataclass(frozen=True)
+class Lagged:
+    """Prescribed values with the boundary charge of the last accepted step: the scheme that oscillates (Fig. 8, upper)."""
+
+    charge_of = "last"
+
+
+@dataclass(frozen=True)
+class Frozen:
+    """Prescribed values with the boundary charge of the start, whatever the deformation (Fig. 4, cfc = cfc0)."""
+
+    charge_of = "start"
+
+
+Treatment: TypeAlias = Penalty | Lagged | Frozen
+
+
+@dataclass(frozen=True)
+class Bath:
+    """A salt bath on a boundary ("top" or "top|left").
+
+    `c` is the salt concentration c̄ [mol/l], `P` the hydraulic pressure P̄ [N/mm²]; each a number or a schedule. Raises
+    InputError for a concentration that is not positive or beyond 10 mol/l.
+    """
+
+    boundary: str
+    c: float | Schedule
+    P: float | Schedule = 0.0
+    treatment: Treatment = Penalty(relative=1e4)
+
+    def __post_init__(self) -> None:
+        for value in self.concentration.values:
+            if not 0 < value <= 10:
+                raise InputError(
+                    f"bath on {self.boundary!r}: concentration {value:g} mol/l is outside 0 … 10 (0 excluded; "
+                    "for pure water use a small one, such as 1e-6; 1 mol/l = 1000 mol/m³)"
+                )
+        for value in self.pressure.values:
+            if not abs(value) <= 1e3:
+                raise InputError(f"bath on {self.boundary!r}: P = {value:g} N/mm² is beyond ±1e3; 1 N/mm² = 1e6 Pa")
+        if not isinstance(self.treatment, Treatment):
+            raise InputError(
+                f"bath on {self.boundary!r}: treatment {self.treatment!r} is none of Penalty(...), Lagged(), Frozen()"
+            )
+
+    @property
+    def concentration(self) -> Schedule:
+        return schedule(self.c)
+
+    @property
+    def pressure(self) -> Schedule:
+        return schedule(self.P)

@@ -1,0 +1,83 @@
+"""Constitutive laws: functions of the state, one equation each. All take NGSolve fields (trial functions or results).
+
+F is the deformation gradient, J its determinant, nF the porosity, c the cation concentration and cfc the fixed charge per
+fluid volume. Fluxes are linear in the gradients they are given, so they come out in the frame the gradients are in.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from ngsolve import CoefficientFunction, Det, Id, InnerProduct, log
+
+from ngswell.materials import Field, Material
+
+
+def solidity(J: CoefficientFunction, material: Material) -> CoefficientFunction:
+    """nS = nS0 / J, eq. (13)₁ [-]."""
+    return material.nS0 / J
+
+
+def fluid_content(J: CoefficientFunction, material: Material) -> CoefficientFunction:
+    """Fluid volume per reference volume J nF = J − nS0 [-]; zero at the compression point."""
+    return J - material.nS0
+
+
+def fixed_charge(J: CoefficientFunction, material: Material, charge: Field = 1.0) -> CoefficientFunction:
+    """cfc = (1 − nS0) cfc0 / (J − nS0), eq. (13)₂ [mol/l]; `charge` scales cfc0."""
+    return charge * (1 - material.nS0) * material.cfc0 / fluid_content(J, material)
+
+
+def solid_energy(F: CoefficientFunction, material: Material) -> CoefficientFunction:
+    """Energy of the extra stress (18) per reference volume [N/mm²].
+
+    ψ = µ/2 tr C − µ ln J + λ (1 − nS0)² [J/(1 − nS0) − ln(J − nS0)]: neo-Hookean, with a pole at the compression point
+    J = nS0. In plane strain and in confined motion the omitted directions add a constant.
+    """
+    J, m = Det(F), material
+    volumetric = m.lam * (1 - m.nS0) ** 2 * (J / (1 - m.nS0) - log(J - m.nS0))
+    return m.mu / 2 * InnerProduct(F, F) - m.mu * log(J) + volumetric
+
+
+def extra_stress(F: CoefficientFunction, material: Material) -> CoefficientFunction:
+    """Kirchhoff extra stress τ = µ (B − I) + λ (1 − nS0)² [J/(1 − nS0) − J/(J − nS0)] I, eq. (18) [N/mm²]."""
+    J, m, one = Det(F), material, Id(F.dims[0])
+    return m.mu * (F * F.trans - one) + m.lam * (1 - m.nS0) ** 2 * (J / (1 - m.nS0) - J / (J - m.nS0)) * one
+
+
+class Transport(NamedTuple):
+    """Fluxes relative to the solid: nF wF [mm/s], nF c₊ w₊ and nF c₋ w₋ [mol/l mm/s]."""
+
+    fluid: CoefficientFunction
+    cations: CoefficientFunction
+    anions: CoefficientFunction
+
+
+def transport(
+    material: Material,
+    nF: CoefficientFunction,
+    c: CoefficientFunction,
+    cfc: CoefficientFunction,
+    drive: CoefficientFunction,
+    grad_c: CoefficientFunction,
+    grad_cfc: CoefficientFunction,
+) -> Transport:
+    """Extended Darcy and Fick laws with the electric potential eliminated by zero current, eqs. (19) to (22).
+
+    `drive` is grad p (less the fluid's weight where a scene has one). The pressure that drives is the overall one: with the
+    factor printed in (19) a gel in Donnan equilibrium with non-uniform charge would not come to rest. (20) is taken with
+    the porosity that D_L in (22) needs; ion saturations are zero.
+
+        nF wF     = −K (drive + cfc grad E)
+        nF c± w±  = −nF D± (grad c± ± c± grad E / Rθ) + c± nF wF
+        grad E    = −Rθ/Θ [D_L/Rθ drive − (D₋ − D₊) grad c + D₋ grad cfc],
+        Θ = D₊ c + D₋ (c − cfc) + D_L cfc,   D_L = cfc K Rθ / nF
+    """
+    m, RT = material, material.RT
+    D_L = cfc * m.K * RT / nF
+    conductance = m.D_plus * c + m.D_minus * (c - cfc) + D_L * cfc
+    field = -1 / conductance * (D_L / RT * drive - (m.D_minus - m.D_plus) * grad_c + m.D_minus * grad_cfc)  # grad E / Rθ
+    fluid = -m.K * (drive + RT * cfc * field)
+    plus = -nF * m.D_plus * (grad_c + c * field) + c * fluid
+    minus = -nF * m.D_minus * (grad_c - grad_cfc - (c - cfc) * field) + (c - cfc) * fluid
+    return Transport(fluid, plus, minus)

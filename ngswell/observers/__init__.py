@@ -1,0 +1,9 @@
+"""What is watched during a run. Each observer starts, observes accepted steps at the times it asks for, and finishes."""
+
+from ngswell.observers.base import Observer
+from ngswell.observers.ledger import Ledger
+from ngswell.observers.progress import Progress
+from ngswell.observers.sampling import Area, Integral, Probe, Snapshots
+from ngswell.observers.vtk import VTK
+
+__all__ = ["VTK", "Area", "Integral", "Ledger", "Observer", "Probe", "Progress", "Snapshots"]

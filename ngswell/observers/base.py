@@ -1,0 +1,57 @@
+"""The life of an observer."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import isclose
+
+import numpy as np
+
+from ngswell.errors import InputError
+from ngswell.problem import Problem
+from ngswell.stepping import StepReport
+
+
+class Observer:
+    """Base of all observers. `when` is None (every accepted step), an interval [s] or a list of times [s].
+
+    Steps land on the times asked for. Raises InputError for times that the run does not pass.
+    """
+
+    def __init__(self, when: float | Sequence[float] | None = None) -> None:
+        if isinstance(when, (int, float)) and not when > 0:
+            raise InputError(f"{type(self).__name__}: the interval has to be positive, got {when} s")
+        self.when = when
+        self._times: list[float] = []
+
+    def times(self, begin: float, until: float) -> list[float]:
+        """Times [s] on which steps have to land."""
+        if self.when is None:
+            self._times = []
+        elif isinstance(self.when, (int, float)):
+            self._times = [*np.arange(begin, until, self.when).tolist(), until]
+        else:
+            for time in self.when:
+                if not begin <= time <= until:
+                    raise InputError(f"{type(self).__name__}: {time:g} s is outside the run, {begin:g} to {until:g} s")
+            self._times = [float(time) for time in self.when]
+        return self._times
+
+    def _due(self, time: float) -> bool:
+        return self.when is None or any(isclose(time, t, rel_tol=1e-12, abs_tol=1e-12) for t in self._times)
+
+    def start(self, problem: Problem, begin: float, until: float) -> None:
+        """Called once, with the initial state."""
+        if self._due(begin):
+            self.record(problem, begin)
+
+    def observe(self, problem: Problem, report: StepReport) -> None:
+        """Called after every accepted step."""
+        if self._due(report.time):
+            self.record(problem, report.time)
+
+    def record(self, problem: Problem, time: float) -> None:
+        """Called at the start and after accepted steps, where due."""
+
+    def finish(self, problem: Problem) -> None:
+        """Called once at the end, also of a run that failed."""

@@ -1,0 +1,49 @@
+"""How far a run is."""
+
+from __future__ import annotations
+
+import sys
+from time import perf_counter
+
+from tqdm import tqdm
+
+from ngswell.observers.base import Observer
+from ngswell.problem import Problem
+from ngswell.stepping import StepReport
+
+
+class Progress(Observer):
+    """A bar over the simulated time on a terminal; elsewhere one line when the run ends."""
+
+    def __init__(self, label: str = "run") -> None:
+        super().__init__()
+        self.label = label
+
+    def start(self, problem: Problem, begin: float, until: float) -> None:
+        self._begin, self._clock, self._reports = begin, perf_counter(), 0
+        self._iterations = self._rejected = 0
+        self._reached = begin
+        self._bar = tqdm(
+            total=until - begin,
+            desc=self.label,
+            disable=not sys.stderr.isatty(),
+            leave=False,
+            bar_format="{desc} {percentage:3.0f}%|{bar}| {n:.0f}/{total:.0f} s simulated [{elapsed}<{remaining}{postfix}]",
+        )
+
+    def observe(self, problem: Problem, report: StepReport) -> None:
+        self._reports += 1
+        self._iterations += report.iterations
+        self._rejected += len(report.rejected)
+        self._reached = report.time
+        self._bar.set_postfix_str(f"step {report.dt:.3g} s, {report.iterations} iterations", refresh=False)
+        self._bar.update(report.time - self._begin - self._bar.n)
+
+    def finish(self, problem: Problem) -> None:
+        self._bar.close()
+        print(
+            f"{self.label}: t = {self._begin:g} to {self._reached:g} s, {self._reports} steps ({self._rejected} rejected), "
+            f"{self._iterations} Newton iterations, {problem.space.ndof} unknowns, {perf_counter() - self._clock:.1f} s",
+            file=sys.stderr,
+            flush=True,
+        )

@@ -1,0 +1,118 @@
+"""Values at a point, integrals over the body or a boundary, and whole states."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from ngsolve import BND, CF, BoundaryFromVolumeCF, CoefficientFunction, Integrate, Norm, specialcf
+from numpy.typing import NDArray
+
+from ngswell.errors import InputError
+from ngswell.observers.base import Observer
+from ngswell.problem import Problem, Snapshot
+
+
+def _output(problem: Problem, name: str) -> CoefficientFunction:
+    outputs = problem.state.outputs()
+    if name not in outputs:
+        raise InputError(f"there is no quantity {name!r}; the model gives {', '.join(outputs)}")
+    return outputs[name]
+
+
+class Probe(Observer):
+    """Quantities at a point of the reference configuration [mm].
+
+    `Probe((1.1, 0.5), "J", "p")`; then `probe.times` and `probe.values["J"]` are arrays, one row a record. Quantities and
+    units are those of `ngswell.models.concentration.OUTPUT_UNITS`.
+    """
+
+    def __init__(self, point: Sequence[float], *quantities: str, when: float | Sequence[float] | None = None) -> None:
+        super().__init__(when)
+        if not quantities:
+            raise InputError("Probe: name at least one quantity, such as 'displacement'")
+        self.point, self.quantities = tuple(point), quantities
+        self._seen: list[float] = []
+        self._values: dict[str, list] = {name: [] for name in quantities}
+
+    def start(self, problem: Problem, begin: float, until: float) -> None:
+        if len(self.point) != problem.mesh.dim or not problem.mesh.Contains(*self.point):
+            raise InputError(f"Probe: {self.point} is not a point of the {problem.mesh.dim}-d body")
+        self._fields = {name: _output(problem, name) for name in self.quantities}
+        super().start(problem, begin, until)
+
+    def record(self, problem: Problem, time: float) -> None:
+        self._seen.append(time)
+        point = problem.mesh(*self.point)
+        for name, field in self._fields.items():
+            self._values[name].append(field(point))
+
+    @property
+    def time(self) -> NDArray:
+        """Times of the records [s]."""
+        return np.array(self._seen)
+
+    @property
+    def values(self) -> dict[str, NDArray]:
+        """Records of each quantity: one row a time."""
+        return {name: np.array(rows) for name, rows in self._values.items()}
+
+
+class Integral(Observer):
+    """Integral of a quantity over the deformed body, or over the deformed `boundary`; of 1 if no quantity is named."""
+
+    def __init__(
+        self,
+        quantity: str | None = None,
+        boundary: str | None = None,
+        when: float | Sequence[float] | None = None,
+    ) -> None:
+        super().__init__(when)
+        self.quantity, self.boundary = quantity, boundary
+        self._seen: list[float] = []
+        self._values: list = []
+
+    def start(self, problem: Problem, begin: float, until: float) -> None:
+        quantity = CF(1.0) if self.quantity is None else _output(problem, self.quantity)
+        if self.boundary is None:
+            self._density = (quantity * problem.state.J).Compile()
+            self._region = {"mesh": problem.mesh}
+        else:
+            problem.scene.check_boundary("Integral", self.boundary)
+            cofactor = BoundaryFromVolumeCF(problem.state.cofactor)
+            stretch = Norm(cofactor * specialcf.normal(problem.mesh.dim)) if problem.mesh.dim > 1 else CF(1.0)
+            self._density = BoundaryFromVolumeCF(quantity) * stretch
+            self._region = {"mesh": problem.mesh, "VOL_or_BND": BND, "definedon": problem.mesh.Boundaries(self.boundary)}
+        super().start(problem, begin, until)
+
+    def record(self, problem: Problem, time: float) -> None:
+        self._seen.append(time)
+        self._values.append(Integrate(self._density, order=2 * problem.model.order + 2, **self._region))
+
+    @property
+    def time(self) -> NDArray:
+        """Times of the records [s]."""
+        return np.array(self._seen)
+
+    @property
+    def values(self) -> NDArray:
+        """Records, one row a time; the quantity's unit times mm (1-d, or a boundary in 2-d), mm² or mm³."""
+        return np.array(self._values)
+
+
+class Area(Integral):
+    """Area of the deformed body in plane strain [mm²]; its length in confined motion [mm]."""
+
+    def __init__(self, when: float | Sequence[float] | None = None) -> None:
+        super().__init__(when=when)
+
+
+class Snapshots(Observer):
+    """Whole states at the given times, for pictures (`Problem.restore`) and for runs that go on from them."""
+
+    def __init__(self, when: Sequence[float]) -> None:
+        super().__init__(when)
+        self.states: list[Snapshot] = []
+
+    def record(self, problem: Problem, time: float) -> None:
+        self.states.append(problem.snapshot(time))

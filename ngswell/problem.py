@@ -1,0 +1,299 @@
+"""A scene on its mesh: spaces, forms, the parameters that follow the clock, and the vectors of a run."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from ngsolve import (
+    CF,
+    VOL,
+    BaseMatrix,
+    BaseVector,
+    BilinearForm,
+    BitArray,
+    GridFunction,
+    InnerProduct,
+    Integrate,
+    Parameter,
+    Variation,
+    ds,
+    dx,
+    x,
+    y,
+    z,
+)
+from numpy.typing import NDArray
+
+from ngswell import donnan
+from ngswell.baths import Bath, Penalty, Site
+from ngswell.models.concentration import State
+from ngswell.models.terms import Term
+from ngswell.quadrature import points
+from ngswell.schedules import Signal
+from ngswell.supports import Traction, Weight
+
+BONUS_ORDER = 2
+"""Extra integration order: the pulled-back terms are rational in F."""
+
+
+@dataclass(frozen=True)
+class _BathInForms:
+    bath: Bath
+    concentration: Signal
+    hydraulic: Signal
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """The fields at one time: what a run can go on from. `values` are all coefficients, in the order of the space."""
+
+    time: float
+    values: NDArray
+
+
+class Problem:
+    """The discrete system of a scene at one time step of backward Euler:
+
+        r(x) = [S(x) − S(x_old)] / Δt + R(x) = 0,
+
+    S the contents (terms of kind "rate"), R everything else. S(x_old) is a vector computed once a step, so no form sees an
+    old state. Linearisations are NGSolve's.
+    """
+
+    def __init__(self, scene) -> None:  # type: ignore[no-untyped-def]  # Scene imports this module
+        self.scene = scene
+        self.mesh, self.model, self.kinematics = scene.mesh, scene.model, scene.kinematics
+        material = scene.material
+
+        strong = [bath for bath in scene.baths if not isinstance(bath.treatment, Penalty)]
+        self.essential = "|".join(bath.boundary for bath in strong)
+        self.space = self.model.space(self.mesh, self.kinematics, scene.held(), self.essential)
+        self.fields = GridFunction(self.space)
+        self.names = self.model.unknowns
+        spans = [self.space.Range(i) for i in range(len(self.names))]
+        self.ranges = {name: slice(span.start, span.stop) for name, span in zip(self.names, spans, strict=True)}
+        self.free = self._free_dofs()
+
+        self.dt = Parameter(1.0)
+        self._charge = scene.charge.signal()
+        self._baths = [_BathInForms(b, b.concentration.signal(), b.pressure.signal()) for b in scene.baths]
+
+        trials, tests = (list(functions) for functions in self.space.TnT())
+        weight = next((load for load in scene.loads if isinstance(load, Weight)), None)
+        state = State(material, self.kinematics, *trials, self._charge.field, weight)
+        self.terms = self.model.terms(state, tests) + self._boundary_terms(state, tests)
+        self.state = State(material, self.kinematics, *self.fields.components, self._charge.field, weight)
+
+        self._system = BilinearForm(self.space)
+        self._contents = BilinearForm(self.space)
+        for term in self.terms:
+            self._system += self._integral(term, 1 / self.dt if term.kind == "rate" else None)
+            if term.kind == "rate":
+                self._contents += self._integral(term, None)
+        self._start_charge = GridFunction(self.space.components[self.names.index("cfc")])
+        self._old_contents = self.fields.vec.CreateVector()
+
+    # -- forms ---------------------------------------------------------------------------------------------------------
+
+    def _boundary_terms(self, state: State, tests: list) -> list[Term]:
+        v, q, d, _ = tests
+        terms = []
+        for entry in self._baths:
+            bath = entry.bath
+            if not isinstance(bath.treatment, Penalty):
+                continue
+            site = Site(
+                state.p,
+                state.c,
+                state.cfc,
+                entry.concentration.field,
+                entry.hydraulic.field,
+                state.material,
+                self.cell_size(bath.boundary),
+            )
+            fluid, cations = bath.treatment.efflux(site)
+            stretch = self.kinematics.area_stretch(state.u)
+            terms.append(Term("fluid", "efflux", fluid * stretch * q, boundary=bath.boundary))
+            terms.append(Term("cations", "efflux", cations * stretch * d, boundary=bath.boundary))
+        for load in self.scene.loads:
+            if isinstance(load, Traction):
+                power = InnerProduct(CF(load.vector), self.kinematics.vector(v))
+                terms.append(Term("momentum", "traction", -power, boundary=load.boundary))
+        return terms
+
+    def _integral(self, term: Term, factor):  # type: ignore[no-untyped-def]
+        integrand = (term.integrand if factor is None else factor * term.integrand).Compile()
+        if term.boundary is not None:
+            return integrand * ds(definedon=self.mesh.Boundaries(term.boundary), bonus_intorder=BONUS_ORDER)
+        integral = integrand * dx(bonus_intorder=BONUS_ORDER)
+        return Variation(integral) if term.kind == "energy" else integral
+
+    def form(self, term: Term) -> BilinearForm:
+        """One term alone, for ledgers and tests."""
+        form = BilinearForm(self.space)
+        form += self._integral(term, None)
+        return form
+
+    def cell_size(self, boundary: str) -> float:
+        """Volume of the cells at a boundary over its area: their size normal to it [mm]."""
+        region = self.mesh.Boundaries(boundary)
+        nodes = {1: "vertices", 2: "edges", 3: "faces"}[self.mesh.dim]
+        faces = {getattr(element, nodes)[0].nr for element in region.Elements()}
+        cells = {cell.nr for cell in self.mesh.Elements(VOL) if any(face.nr in faces for face in cell.facets)}
+        volumes = Integrate(CF(1.0), self.mesh, VOL, element_wise=True).NumPy()
+        return float(volumes[sorted(cells)].sum() / Integrate(CF(1.0), self.mesh, definedon=region))
+
+    def _free_dofs(self) -> BitArray:
+        free = BitArray(self.space.FreeDofs())
+        for dof in self.scene.pinned_dofs(self.space.components[0]):
+            free.Clear(dof)
+        return free
+
+    # -- clock and states ----------------------------------------------------------------------------------------------
+
+    def set_time(self, time: float) -> None:
+        """Move every schedule to `time` [s]."""
+        self._charge.set(time)
+        for entry in self._baths:
+            entry.concentration.set(time)
+            entry.hydraulic.set(time)
+
+    def initialise(self) -> None:
+        """The reference configuration in Donnan equilibrium with the initial bath, at the scene's start."""
+        self.set_time(self.scene.start)
+        bath, hydraulic = self.scene.initial_bath()
+        cfc = self._charge.field * self.scene.material.cfc0
+        self.fields.vec[:] = 0.0
+        by_name = dict(zip(self.names, self.fields.components, strict=True))
+        by_name["p"].Set(donnan.pressure(CF(bath), cfc, self.scene.material.RT, hydraulic))
+        by_name["c"].Set(donnan.cations(CF(bath), cfc))
+        by_name["cfc"].Set(cfc)
+        self._start_charge.vec.data = by_name["cfc"].vec
+        self.initial = self.vector.copy()
+
+    def snapshot(self, time: float) -> Snapshot:
+        return Snapshot(time, self.vector.copy())
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Put the fields and the clock back to a snapshot."""
+        self.set_time(snapshot.time)
+        self.vector[:] = snapshot.values
+
+    @property
+    def vector(self) -> NDArray:
+        """All coefficients, as a numpy view."""
+        return self.fields.vec.FV().NumPy()
+
+    def begin_step(self, time: float, dt: float, guess: NDArray | None = None) -> None:
+        """Prepare the step that ends at `time`: history, parameters, prescribed values; `guess` as first iterate."""
+        self._contents.Apply(self.fields.vec, self._old_contents)
+        self.dt.Set(dt)
+        prescribed = {entry.bath.boundary: self._charge_at(entry.bath) for entry in self._baths if self._is_strong(entry)}
+        self.set_time(time)
+        values = self._prescribed_values(prescribed)
+        if guess is not None:
+            self.vector[:] = guess
+        for dofs, numbers in values:
+            self.vector[dofs] = numbers
+
+    def _is_strong(self, entry: _BathInForms) -> bool:
+        return not isinstance(entry.bath.treatment, Penalty)
+
+    def _charge_at(self, bath: Bath) -> GridFunction:
+        if bath.treatment.charge_of == "start":  # type: ignore[union-attr]
+            return self._start_charge
+        last = GridFunction(self._start_charge.space)
+        last.vec.data = self.fields.components[self.names.index("cfc")].vec
+        return last
+
+    def _prescribed_values(self, charges: dict[str, GridFunction]) -> list[tuple[NDArray, NDArray]]:
+        found = []
+        for entry in self._baths:
+            if not self._is_strong(entry):
+                continue
+            region = self.mesh.Boundaries(entry.bath.boundary)
+            cfc, bath = charges[entry.bath.boundary], entry.concentration.field
+            for name, value in (
+                ("p", donnan.pressure(bath, cfc, self.scene.material.RT, entry.hydraulic.field)),
+                ("c", donnan.cations(bath, cfc)),
+            ):
+                space = self.space.components[self.names.index(name)]
+                on_boundary = GridFunction(space)
+                on_boundary.Set(value, definedon=region)
+                dofs = np.flatnonzero(list(space.GetDofs(region)))
+                found.append((self.ranges[name].start + dofs, on_boundary.vec.FV().NumPy()[dofs]))
+        return found
+
+    # -- the discrete system -------------------------------------------------------------------------------------------
+
+    def residual(self, result: BaseVector) -> None:
+        """r at the present fields, on all degrees of freedom (constrained ones hold reactions)."""
+        self._system.Apply(self.fields.vec, result)
+        result.data -= (1 / self.dt.Get()) * self._old_contents
+
+    def linearise(self) -> BaseMatrix:
+        """dr/dx at the present fields, on all degrees of freedom."""
+        self._system.AssembleLinearization(self.fields.vec)
+        return self._system.mat
+
+    def contents(self, result: BaseVector) -> None:
+        """S at the present fields: its sum over the vertex functions of p or c is the fluid or the salt held."""
+        self._contents.Apply(self.fields.vec, result)
+
+    @cached_property
+    def _quadrature(self) -> NDArray:
+        return points(self.mesh, VOL, 2 * self.model.order)
+
+    @cached_property
+    def _positions(self) -> NDArray:
+        return CF((x, y, z)[: self.mesh.dim])(self._quadrature)
+
+    @cached_property
+    def _bounds(self) -> list[tuple[str, object]]:
+        s = self.state
+        return [
+            ("fluid content J − nS0", (s.J - s.material.nS0).Compile()),
+            ("cation concentration", s.c),
+        ]
+
+    def inadmissible(self) -> tuple[str, tuple[float, ...]] | None:
+        """What leaves the physical range (J − nS0 > 0, c > 0) at a quadrature point, and where; None if nothing does."""
+        for name, field in self._bounds:
+            values = field(self._quadrature).ravel()  # type: ignore[operator]
+            worst = int(np.argmin(np.where(np.isfinite(values), values, -np.inf)))
+            if not values[worst] > 0:
+                return name, tuple(self._positions[worst])
+        return None
+
+    @cached_property
+    def references(self) -> dict[str, float]:
+        """A size of each unknown that the scene itself sets, so that tolerances need no units."""
+        scene = self.scene
+        corners = np.array([vertex.point for vertex in self.mesh.vertices])
+        length = float(np.linalg.norm(corners.max(axis=0) - corners.min(axis=0)))
+        charge = scene.material.largest("cfc0", self.mesh) * max(map(abs, scene.charge.values))
+        concentration = max([charge, *(value for bath in scene.baths for value in bath.concentration.values)])
+        return {
+            "u": length,
+            "p": scene.material.largest("mu", self.mesh),
+            "c": concentration,
+            "cfc": concentration,
+        }
+
+    def worst(self, vector: NDArray) -> tuple[str, tuple[float, ...]]:
+        """The unknown with the largest entry of `vector` in units of its reference, and the vertex [mm] where it is."""
+        name = max(self.names, key=lambda n: _largest(vector[self.ranges[n]]) / self.references[n])
+        part = np.abs(vector[self.ranges[name]])
+        per_component = part.reshape(-1, len(part) // self._components(name))[:, : self.mesh.nv].max(axis=0)
+        vertex = int(np.argmax(np.where(np.isfinite(per_component), per_component, np.inf)))
+        return name, tuple(self.mesh.vertices[vertex].point)
+
+    def _components(self, name: str) -> int:
+        return self.kinematics.dimension if name == "u" else 1
+
+
+def _largest(values: NDArray) -> float:
+    largest = float(np.abs(values).max())
+    return largest if np.isfinite(largest) else np.inf

@@ -1,0 +1,303 @@
+"""A scene: mesh, kinematics, material, model, supports, baths and loads, checked and run."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from time import perf_counter
+
+import numpy as np
+from ngsolve import CoefficientFunction, FESpace, Mesh, TaskManager, specialcf
+
+from ngswell.baths import Bath
+from ngswell.errors import InputError
+from ngswell.kinematics import Kinematics
+from ngswell.materials import Material
+from ngswell.models import Concentration
+from ngswell.newton import Newton
+from ngswell.observers.base import Observer
+from ngswell.problem import Problem, Snapshot
+from ngswell.quadrature import points
+from ngswell.schedules import Ramp
+from ngswell.stepping import Adaptive, BackwardEuler, Control, StepReport
+from ngswell.supports import Load, Pin, Roller, Support, Symmetry, Traction, Weight
+
+
+@dataclass(frozen=True)
+class Result:
+    """What a run did: its accepted steps, and the state it ended in. Numbers of interest are kept by the observers."""
+
+    steps: tuple[StepReport, ...]
+    end: Snapshot
+    seconds: float
+
+    @property
+    def iterations(self) -> int:
+        """Newton iterations of all accepted steps."""
+        return sum(step.iterations for step in self.steps)
+
+    @property
+    def rejections(self) -> int:
+        """Rejected steps."""
+        return sum(len(step.rejected) for step in self.steps)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Scene:
+    """An initial boundary-value problem of a swelling body. Units mm, N, s, K, mol/l throughout.
+
+    The body starts undeformed, in Donnan equilibrium with `initial` (salt concentration [mol/l] and hydraulic
+    pressure [N/mm²]; by default that of its baths at `start`, which then have to agree). `charge` multiplies the
+    material's cfc0 over time. Raises InputError for anything that cannot be meant.
+    """
+
+    mesh: Mesh
+    kinematics: Kinematics
+    material: Material
+    model: Concentration = Concentration()
+    supports: Sequence[Support] = ()
+    baths: Sequence[Bath] = ()
+    loads: Sequence[Load] = ()
+    charge: Ramp = Ramp((0.0, 1.0))
+    start: float = 0.0  # [s]
+    initial: tuple[float, float] | None = None
+
+    def __post_init__(self) -> None:
+        if self.kinematics.dimension != self.mesh.dim:
+            raise InputError(
+                f"{type(self.kinematics).__name__} needs a {self.kinematics.dimension}-d mesh, this one is {self.mesh.dim}-d"
+            )
+        self.material.check_on(self.mesh)
+        for value in self.charge.values:
+            if not 0 <= value <= 100:
+                raise InputError(f"charge factor {value:g} is outside 0 … 100; it multiplies cfc0")
+        self._check_baths()
+        self._check_supports()
+        self._check_loads()
+        self.initial_bath()
+
+    # -- checks --------------------------------------------------------------------------------------------------------
+
+    def check_boundary(self, what: str, boundary: str) -> list[str]:
+        known = sorted(set(self.mesh.GetBoundaries()))
+        names = boundary.split("|")
+        for name in names:
+            if name not in known:
+                raise InputError(f"{what}: the mesh has no boundary {name!r}; it has {', '.join(known)}")
+            if re.escape(name) != name:
+                raise InputError(f"{what}: boundary {name!r} has characters that NGSolve reads as a pattern; rename it")
+        return names
+
+    def _check_directions(self, what: str, directions: str) -> None:
+        if not directions or any(d not in self.kinematics.directions for d in directions):
+            choices = ", ".join(self.kinematics.directions)
+            raise InputError(f"{what}: direction {directions!r} is none of {choices} (or several of them)")
+
+    def _check_baths(self) -> None:
+        held: set[str] = set()
+        for bath in self.baths:
+            for name in self.check_boundary("bath", bath.boundary):
+                if name in held:
+                    raise InputError(f"bath on {bath.boundary!r}: boundary {name!r} already has a bath")
+                held.add(name)
+
+    def _check_supports(self) -> None:
+        bath_boundaries = {name for bath in self.baths for name in bath.boundary.split("|")}
+        for support in self.supports:
+            what = type(support).__name__
+            if isinstance(support, Pin):
+                self._check_directions(what, support.direction)
+                self._vertex(support)
+                continue
+            names = self.check_boundary(what, support.boundary)
+            if isinstance(support, Roller):
+                self._check_directions(what, support.direction)
+            else:
+                self._normal_direction(support)
+                for name in names:
+                    if name in bath_boundaries:
+                        raise InputError(f"Symmetry on {name!r}: it has a bath, but nothing flows through a symmetry plane")
+        self._check_rigid_motions()
+
+    def _check_loads(self) -> None:
+        held = self.held()
+        for load in self.loads:
+            vectors = (load.vector,) if isinstance(load, Traction) else (load.fluid, load.solid)
+            for vector in vectors:
+                if len(vector) != self.mesh.dim:
+                    raise InputError(f"{type(load).__name__}: {vector} needs {self.mesh.dim} components")
+            if isinstance(load, Traction):
+                names = self.check_boundary("Traction", load.boundary)
+                for direction, value in zip(self.kinematics.directions, load.vector, strict=True):
+                    for name in names:
+                        if value and name in held[direction].split("|"):
+                            raise InputError(f"Traction on {name!r}: a support holds it in {direction}, so it has no effect")
+        if sum(isinstance(load, Weight) for load in self.loads) > 1:
+            raise InputError("loads hold more than one Weight; add the vectors up")
+
+    def _check_rigid_motions(self) -> None:
+        """Refuse supports that leave the body free to translate or rotate."""
+        directions = self.kinematics.directions
+        rows, vertices = [], np.array([vertex.point for vertex in self.mesh.vertices])
+        vertices -= vertices.mean(axis=0)
+        vertices /= np.abs(vertices).max()
+        for axis, direction in enumerate(directions):
+            fixed = {
+                vertex.nr
+                for name in self.held()[direction].split("|")
+                if name
+                for element in self.mesh.Boundaries(name).Elements()
+                for vertex in element.vertices
+            }
+            fixed |= {self._vertex(s) for s in self.supports if isinstance(s, Pin) and direction in s.direction}
+            rows += [_rigid_motions(vertices[number])[axis] for number in fixed]
+        motions = _rigid_motions(vertices[0]).shape[1]
+        names = [f"translate in {d}" for d in directions] + ["rotate"] * (motions - len(directions))
+        _, sizes, modes = np.linalg.svd(np.array(rows).reshape(-1, motions))
+        rank = int((sizes > 1e-9).sum())
+        if rank < motions:
+            free = names[int(np.argmax(np.abs(modes[-1])))]
+            raise InputError(f"the body can {free}: add a Roller, Symmetry or Pin")
+
+    def _vertex(self, pin: Pin) -> int:
+        vertices = np.array([vertex.point for vertex in self.mesh.vertices])
+        if len(pin.point) != self.mesh.dim:
+            raise InputError(f"Pin at {pin.point} needs {self.mesh.dim} coordinates [mm]")
+        distances = np.linalg.norm(vertices - np.array(pin.point), axis=1)
+        nearest = int(np.argmin(distances))
+        if distances[nearest] > 1e-9 * max(1.0, float(np.abs(vertices).max())):
+            raise InputError(f"Pin at {pin.point}: no mesh vertex there; the nearest is {tuple(vertices[nearest])}")
+        return nearest
+
+    def _normal_direction(self, support: Symmetry) -> str:
+        region = self.mesh.Boundaries(support.boundary)
+        normals = np.abs(specialcf.normal(self.mesh.dim)(points(self.mesh, region, 2)))
+        axis = int(np.argmax(normals[0]))
+        if normals[:, axis].min() < 1 - 1e-9:
+            raise InputError(f"Symmetry on {support.boundary!r}: the boundary is not straight along an axis")
+        return self.kinematics.directions[axis]
+
+    # -- what models and problems ask ----------------------------------------------------------------------------------
+
+    def held(self) -> dict[str, str]:
+        """Boundaries ("a|b") on which each displacement component vanishes."""
+        boundaries: dict[str, list[str]] = {direction: [] for direction in self.kinematics.directions}
+        for support in self.supports:
+            if isinstance(support, Roller):
+                for direction in support.direction:
+                    boundaries[direction].append(support.boundary)
+            elif isinstance(support, Symmetry):
+                boundaries[self._normal_direction(support)].append(support.boundary)
+        return {direction: "|".join(names) for direction, names in boundaries.items()}
+
+    def pinned_dofs(self, space: FESpace) -> list[int]:
+        """Degrees of freedom of the displacement space that pins hold."""
+        per_component = space.ndof // self.mesh.dim
+        return [
+            self.kinematics.directions.index(direction) * per_component + self._vertex(pin)
+            for pin in self.supports
+            if isinstance(pin, Pin)
+            for direction in pin.direction
+        ]
+
+    def initial_bath(self) -> tuple[CoefficientFunction | float, CoefficientFunction | float]:
+        """Salt concentration [mol/l] and hydraulic pressure [N/mm²] that the initial state is in equilibrium with."""
+        if self.initial is not None:
+            Bath("initial", *self.initial)
+            return self.initial
+        if not self.baths:
+            raise InputError("the scene has no bath: give initial=(concentration, hydraulic pressure)")
+        first = self.baths[0]
+        for bath in self.baths[1:]:
+            mine = (bath.concentration.at(self.start), bath.pressure.at(self.start))
+            if mine != (first.concentration.at(self.start), first.pressure.at(self.start)):
+                raise InputError(
+                    f"baths on {first.boundary!r} and {bath.boundary!r} differ at the start: "
+                    "give initial=(concentration, hydraulic pressure)"
+                )
+        return first.concentration.at(self.start), first.pressure.at(self.start)
+
+    @cached_property
+    def problem(self) -> Problem:
+        """The discrete problem, made once. Its fields are those of the last run."""
+        return Problem(self)
+
+    def describe(self) -> str:
+        """What this scene models: unknowns, degrees of freedom, terms; what is not listed is not computed."""
+        problem = self.problem
+        sizes = ", ".join(f"{name} {r.stop - r.start}" for name, r in problem.ranges.items())
+        lines = [
+            f"{type(self.model).__name__}, {type(self.kinematics).__name__}, order {self.model.order}, "
+            f"{self.mesh.ne} elements, {problem.space.ndof} unknowns ({sizes})"
+        ]
+        for balance in self.model.balances:
+            names = [
+                term.name + (f" on {term.boundary}" if term.boundary else "")
+                for term in problem.terms
+                if term.balance == balance
+            ]
+            lines.append(f"  {balance}: {', '.join(names)}")
+        for bath in self.baths:
+            lines.append(f"  bath on {bath.boundary}: {bath.treatment}")
+        return "\n".join(lines)
+
+    # -- running -------------------------------------------------------------------------------------------------------
+
+    def run(
+        self,
+        until: float,
+        steps: Control | None = None,
+        observers: Sequence[Observer] = (),
+        newton: Newton | None = None,
+        resume: Snapshot | None = None,
+    ) -> Result:
+        """Run to `until` [s] from the start, or from the snapshot `resume` of an earlier run of this scene.
+
+        Raises InputError before any computing, OutputError when an observer cannot write, and StepError when no step
+        succeeds; the problem's fields then hold the last accepted state.
+        """
+        begin = self.start if resume is None else resume.time
+        if not until > begin:
+            raise InputError(f"until = {until:g} s is not after the start at {begin:g} s")
+        control = Adaptive() if steps is None else steps
+        problem = self.problem
+        if resume is not None and resume.values.shape != problem.vector.shape:
+            raise InputError(f"resume: the snapshot has {resume.values.size} unknowns, the scene {problem.vector.size}")
+        schedules = [self.charge, *(s for bath in self.baths for s in (bath.concentration, bath.pressure))]
+        kinks = sorted({k for schedule in schedules for k in schedule.kinks if begin < k < until} | {begin, until})
+        stops = sorted({s for observer in observers for s in observer.times(begin, until)})
+        problem.initialise()
+        if resume is not None:
+            problem.restore(resume)
+        reports: list[StepReport] = []
+        clock = perf_counter()
+        started: list[Observer] = []
+        try:
+            with TaskManager():
+                for observer in observers:
+                    observer.start(problem, begin, until)
+                    started.append(observer)
+                stepper = BackwardEuler(problem, control, newton or Newton())
+                time = begin
+                while time < until:
+                    report = stepper.advance(time, kinks, stops)
+                    time = report.time
+                    reports.append(report)
+                    for observer in observers:
+                        observer.observe(problem, report)
+        finally:
+            for observer in started:
+                observer.finish(problem)
+        return Result(tuple(reports), problem.snapshot(until), perf_counter() - clock)
+
+
+def _rigid_motions(point: np.ndarray) -> np.ndarray:
+    """Displacement at `point` (rows) of the rigid motions (columns): translations, then rotations."""
+    if len(point) == 1:
+        return np.eye(1)
+    if len(point) == 2:
+        return np.column_stack([np.eye(2), [-point[1], point[0]]])
+    px, py, pz = point
+    return np.column_stack([np.eye(3), [-py, px, 0.0], [pz, 0.0, -px], [0.0, -pz, py]])

@@ -1,0 +1,110 @@
+"""Values over time, and the times at which they bend.
+
+A schedule is a plain value. A run turns it into a `Signal`: an NGSolve field whose Parameters follow the clock.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Protocol
+
+import numpy as np
+from ngsolve import CoefficientFunction, Parameter
+
+from ngswell.errors import InputError
+
+
+@dataclass(frozen=True)
+class Signal:
+    """A schedule in the forms: `field` enters them, `set(t)` moves it to time t [s]."""
+
+    field: CoefficientFunction
+    set: Callable[[float], None]
+
+
+class Schedule(Protocol):
+    """A value over time: the times at which it bends [s], all values it passes, and its form in a run."""
+
+    @property
+    def kinks(self) -> tuple[float, ...]: ...
+
+    @property
+    def values(self) -> tuple[float, ...]: ...
+
+    def at(self, time: float) -> float | CoefficientFunction: ...
+
+    def signal(self) -> Signal: ...
+
+
+@dataclass(frozen=True, init=False)
+class Ramp:
+    """Piecewise linear in time through (time [s], value) points, constant before the first and after the last.
+
+    `Ramp((7000, 4.1), (7080, 2.7))`; one point is a constant. Raises InputError for times that do not increase.
+    """
+
+    times: tuple[float, ...]
+    values: tuple[float, ...]
+
+    def __init__(self, *points: tuple[float, float]) -> None:
+        if not points:
+            raise InputError("Ramp needs at least one (time, value) point")
+        times, values = (tuple(float(x) for x in column) for column in zip(*points, strict=True))
+        if not all(math.isfinite(x) for x in times + values):
+            raise InputError(f"Ramp has a time or value that is not finite: {points}")
+        for before, after in pairwise(times):
+            if after <= before:
+                raise InputError(f"Ramp times have to increase, but {after:g} s follows {before:g} s")
+        object.__setattr__(self, "times", times)
+        object.__setattr__(self, "values", values)
+
+    @property
+    def kinks(self) -> tuple[float, ...]:
+        return self.times if len(self.times) > 1 else ()
+
+    def at(self, time: float) -> float:
+        """Value at `time` [s]."""
+        return float(np.interp(time, self.times, self.values))
+
+    def signal(self) -> Signal:
+        parameter = Parameter(self.values[0])
+        return Signal(parameter, lambda time: parameter.Set(self.at(time)))
+
+
+@dataclass(frozen=True)
+class Blend:
+    """A history that varies in space: (1 − weight)·first + weight·second, `weight` a field of position in [0, 1]."""
+
+    first: Ramp
+    second: Ramp
+    weight: CoefficientFunction
+
+    @property
+    def kinks(self) -> tuple[float, ...]:
+        return tuple(sorted({*self.first.kinks, *self.second.kinks}))
+
+    @property
+    def values(self) -> tuple[float, ...]:
+        return self.first.values + self.second.values
+
+    def at(self, time: float) -> float | CoefficientFunction:
+        """Value at `time` [s]: a number where both histories agree, else a field."""
+        first, second = self.first.at(time), self.second.at(time)
+        return first if first == second else (1 - self.weight) * first + self.weight * second
+
+    def signal(self) -> Signal:
+        first, second = self.first.signal(), self.second.signal()
+
+        def move(time: float) -> None:
+            first.set(time)
+            second.set(time)
+
+        return Signal((1 - self.weight) * first.field + self.weight * second.field, move)
+
+
+def schedule(value: float | Schedule) -> Schedule:
+    """A number as a constant Ramp; schedules pass through."""
+    return Ramp((0.0, float(value))) if isinstance(value, (int, float)) else value
