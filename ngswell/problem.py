@@ -26,7 +26,6 @@ from ngsolve import (
 )
 from numpy.typing import NDArray
 
-from ngswell import donnan
 from ngswell.baths import Bath, Penalty, Site
 from ngswell.models.concentration import State
 from ngswell.models.terms import Term
@@ -82,9 +81,9 @@ class Problem:
 
         trials, tests = (list(functions) for functions in self.space.TnT())
         weight = next((load for load in scene.loads if isinstance(load, Weight)), None)
-        state = State(material, self.kinematics, *trials, self._charge.field, weight)
+        state = self.model.state(trials, material, self.kinematics, self._charge.field, weight)
         self.terms = self.model.terms(state, tests) + self._boundary_terms(state, tests)
-        self.state = State(material, self.kinematics, *self.fields.components, self._charge.field, weight)
+        self.state = self.model.state(self.fields.components, material, self.kinematics, self._charge.field, weight)
 
         self._system = BilinearForm(self.space)
         self._contents = BilinearForm(self.space)
@@ -92,7 +91,7 @@ class Problem:
             self._system += self._integral(term, 1 / self.dt if term.kind == "rate" else None)
             if term.kind == "rate":
                 self._contents += self._integral(term, None)
-        self._start_charge = GridFunction(self.space.components[self.names.index("cfc")])
+        self._start_charge = GridFunction(self._component("cfc").space)
         self._old_contents = self.fields.vec.CreateVector()
 
     # -- forms ---------------------------------------------------------------------------------------------------------
@@ -153,6 +152,9 @@ class Problem:
 
     # -- clock and states ----------------------------------------------------------------------------------------------
 
+    def _component(self, name: str) -> GridFunction:
+        return self.fields.components[self.names.index(name)]
+
     def set_time(self, time: float) -> None:
         """Move every schedule to `time` [s]."""
         self._charge.set(time)
@@ -166,11 +168,10 @@ class Problem:
         bath, hydraulic = self.scene.initial_bath()
         cfc = self._charge.field * self.scene.material.cfc0
         self.fields.vec[:] = 0.0
-        by_name = dict(zip(self.names, self.fields.components, strict=True))
-        by_name["p"].Set(donnan.pressure(CF(bath), cfc, self.scene.material.RT, hydraulic))
-        by_name["c"].Set(donnan.cations(CF(bath), cfc))
-        by_name["cfc"].Set(cfc)
-        self._start_charge.vec.data = by_name["cfc"].vec
+        values = self.model.equilibrium(CF(bath), CF(hydraulic), cfc, self.scene.material.RT)
+        for name, value in {**values, "cfc": cfc}.items():
+            self._component(name).Set(value)
+        self._start_charge.vec.data = self._component("cfc").vec
         self.initial = self.vector.copy()
 
     def snapshot(self, time: float) -> Snapshot:
@@ -205,7 +206,7 @@ class Problem:
         if bath.treatment.charge_of == "start":  # type: ignore[union-attr]
             return self._start_charge
         last = GridFunction(self._start_charge.space)
-        last.vec.data = self.fields.components[self.names.index("cfc")].vec
+        last.vec.data = self._component("cfc").vec
         return last
 
     def _prescribed_values(self, charges: dict[str, GridFunction]) -> list[tuple[NDArray, NDArray]]:
@@ -215,11 +216,9 @@ class Problem:
                 continue
             region = self.mesh.Boundaries(entry.bath.boundary)
             cfc, bath = charges[entry.bath.boundary], entry.concentration.field
-            for name, value in (
-                ("p", donnan.pressure(bath, cfc, self.scene.material.RT, entry.hydraulic.field)),
-                ("c", donnan.cations(bath, cfc)),
-            ):
-                space = self.space.components[self.names.index(name)]
+            values = self.model.equilibrium(bath, entry.hydraulic.field, cfc, self.scene.material.RT)
+            for name, value in values.items():
+                space = self._component(name).space
                 on_boundary = GridFunction(space)
                 on_boundary.Set(value, definedon=region)
                 dofs = np.flatnonzero(list(space.GetDofs(region)))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import ClassVar
@@ -21,7 +22,7 @@ from ngsolve import (
     sqrt,
 )
 
-from ngswell import laws
+from ngswell import donnan, laws
 from ngswell.errors import InputError
 from ngswell.kinematics import Kinematics
 from ngswell.materials import Field, Material
@@ -61,6 +62,24 @@ class Concentration:
         Q = H1(mesh, order=self.order - 1)
         Q_bath = H1(mesh, order=self.order - 1, dirichlet=essential)
         return FESpace([V, Q_bath, Q_bath, Q])
+
+    def state(
+        self,
+        functions: Sequence[CoefficientFunction],
+        material: Material,
+        kinematics: Kinematics,
+        charge: Field,
+        weight: Weight | None,
+    ) -> State:
+        """The fields that `functions` (trial functions or components of a result, one an unknown) stand for."""
+        u, p, c, cfc = functions
+        return State(material, kinematics, u, p, c, cfc, charge, weight)
+
+    def equilibrium(
+        self, bath: CoefficientFunction, hydraulic: CoefficientFunction, cfc: CoefficientFunction, RT: float
+    ) -> dict[str, CoefficientFunction]:
+        """Values of the unknowns that Donnan equilibrium (23) gives, for initial states and strong treatments."""
+        return {"p": donnan.pressure(bath, cfc, RT, hydraulic), "c": donnan.cations(bath, cfc)}
 
     def terms(self, state: State, tests: list[CoefficientFunction]) -> list[Term]:
         """The balances over the body, pulled back to the reference configuration."""

@@ -1,0 +1,92 @@
+"""Closed forms to compare with."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ngswell import donnan
+from ngswell.errors import InputError
+from ngswell.materials import Material
+
+
+@dataclass(frozen=True)
+class Equilibrium:
+    """A homogeneous swollen state: J [-], cfc [mol/l], nS [-], c [mol/l], p [N/mm²]."""
+
+    J: float
+    cfc: float
+    nS: float
+    c: float
+    p: float
+
+
+FREE_DIRECTIONS = {"confined": 1, "plane strain": 2, "3-d": 3}
+
+
+def homogeneous_equilibrium(
+    material: Material,
+    bath: float,
+    motion: str,
+    hydraulic: float = 0.0,
+    load: float = 0.0,
+    boundary_charge: float | None = None,
+) -> Equilibrium:
+    """The state in which a homogeneous body comes to rest in a bath of `bath` [mol/l] at `hydraulic` [N/mm²].
+
+    `motion` is "confined", "plane strain" or "3-d": d = 1, 2, 3 directions free to stretch by J^(1/d). Equilibrium of the
+    extra stress (18) with the pore pressure (38) and an outer pressure `load` [N/mm²] on the deformed surface:
+
+        µ (J^(2/d) − 1) + λ (1 − nS0)² [J/(1 − nS0) − J/(J − nS0)] = J (p_D(c̄, cfc) − load).
+
+    `boundary_charge` [mol/l] replaces cfc(J) in p_D: a boundary condition that does not follow the deformation.
+    Raises InputError for parameters that vary in space.
+    """
+    if motion not in FREE_DIRECTIONS:
+        raise InputError(f"motion {motion!r} is none of {', '.join(FREE_DIRECTIONS)}")
+    mu, lam, nS0, cfc0 = (_number(name, getattr(material, name)) for name in ("mu", "lam", "nS0", "cfc0"))
+
+    def charge(J: float) -> float:
+        return (1 - nS0) * cfc0 / (J - nS0)
+
+    def pressure(J: float) -> float:
+        return donnan.pressure(bath, charge(J) if boundary_charge is None else boundary_charge, material.RT, hydraulic)
+
+    def excess(J: float) -> float:
+        extra = mu * (J ** (2 / FREE_DIRECTIONS[motion]) - 1)
+        extra += lam * (1 - nS0) ** 2 * (J / (1 - nS0) - J / (J - nS0))
+        return extra - J * (pressure(J) - load)
+
+    low, high = nS0 * (1 + 1e-12), 1.0
+    while excess(high) < 0:
+        high *= 2
+        if high > 1e9:
+            raise InputError(f"no equilibrium: the body swells without bound in a bath of {bath:g} mol/l")
+    while high - low > 4e-16 * high:
+        middle = (low + high) / 2
+        if middle in (low, high):
+            break
+        low, high = (middle, high) if excess(middle) < 0 else (low, middle)
+    cfc = charge(high)
+    if boundary_charge is None:
+        c = donnan.cations(bath, cfc)
+    else:
+        c = donnan.cations(bath, boundary_charge)
+    return Equilibrium(high, cfc, nS0 / high, c, pressure(high))
+
+
+def lagged_column_factor(material: Material, bath: float) -> float:
+    """Factor by which one step of the lagged boundary multiplies a perturbation of a confined column's end [-].
+
+    At the stress-free reference state the end's J follows its pore pressure at once, (2µ + λ) δJ = δp, and the pressure
+    follows the charge of the step before: δp = (dp_D/dcfc) (dcfc/dJ) δJ_old. The factor is their product over 2µ + λ,
+    whatever the time step; the column is stable while it stays above −1.
+    """
+    mu, lam, nS0, cfc0 = (_number(name, getattr(material, name)) for name in ("mu", "lam", "nS0", "cfc0"))
+    slope = 2 * material.RT * (cfc0 / 4) / (bath * bath + cfc0 * cfc0 / 4) ** 0.5
+    return slope * (-cfc0 / (1 - nS0)) / (2 * mu + lam)
+
+
+def _number(name: str, value: object) -> float:
+    if not isinstance(value, (int, float)):
+        raise InputError(f"{name} varies in space: there is no homogeneous equilibrium")
+    return float(value)

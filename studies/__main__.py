@@ -1,0 +1,48 @@
+"""Command line of the studies: `python -m studies [NAME] [--quick] [--out DIR] [--overwrite]`."""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import sys
+from pathlib import Path
+from time import perf_counter
+
+from ngswell import NgswellError
+from ngswell.plotting import use_style
+from studies.output import prepare, write
+
+STUDIES = ("boundary_charge", "oscillation", "free_swelling")
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run the named study, or all; returns the exit status."""
+    parser = argparse.ArgumentParser(prog="python -m studies", description="Draw the paper's figures, with their numbers.")
+    parser.add_argument("name", nargs="?", choices=STUDIES, help="one study; all if none is named")
+    parser.add_argument("--quick", action="store_true", help="coarser and shorter, within about a minute")
+    parser.add_argument("--out", type=Path, help="folder to write to; figures/ by default, figures/quick/ with --quick")
+    parser.add_argument("--overwrite", action="store_true", help="replace files in the folder named with --out")
+    options = parser.parse_args(arguments)
+
+    names = STUDIES if options.name is None else (options.name,)
+    own = Path("figures/quick") if options.quick else Path("figures")
+    folder = own if options.out is None else options.out
+    try:
+        prepare(folder, names, overwrite=options.overwrite or options.out is None)
+        use_style()
+        for name in names:
+            clock = perf_counter()
+            print(f"{name}: started", file=sys.stderr, flush=True)
+            findings = importlib.import_module(f"studies.{name}").run(quick=options.quick)
+            write(folder, name, findings)
+            print(f"{name}: {perf_counter() - clock:.0f} s, wrote {folder / name}.png, .csv, .json", file=sys.stderr)
+            for key, value in findings.numbers.items():
+                print(f"  {key} = {value:.6g}" if isinstance(value, float) else f"  {key} = {value}")
+    except NgswellError as error:
+        print(f"studies: {error}", file=sys.stderr)
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

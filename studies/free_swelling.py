@@ -1,0 +1,213 @@
+"""Figs. 9 and 10: a hydrogel block swells freely in plane strain when its bath is diluted.
+
+Half of the block is modelled, 1.1 × 1.0 mm² with symmetry on the right, baths on top, left and bottom. From 0 to 7000 s the
+fixed charge is brought up and the block comes to rest in 4.1 mol/l; then the baths are diluted, the bottom later than the
+rest. Numbers (areas are relative to the area at 7000 s; errors are estimates of those of the reported value):
+
+- `initial_J`, `initial_cfc` [mol/l], `initial_nS`: means over the block at 7000 s, and `closed_form_...` of each;
+- `core_J_min`, `core_J_min_time_s`: smallest J on the symmetry line at mid-height after 7000 s, `core_J_initial` before:
+  negative osmosis; `corner_J_at_core_min`: J at the free top corner then;
+- `area_ratio_7220`, `area_ratio_11000`: with `..._mesh_error` from a mesh 1.5 times finer (second order assumed) and
+  `..._step_error` from a tolerance four times smaller, which halves the steps (first order); likewise for `core_J_min`;
+- `area_ratio_equilibrium`: when nothing moves any more, with `closed_form_area_ratio_equilibrium`;
+- `fluid_imbalance`, `cation_imbalance`: closure of the ledger relative to the content.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.collections import LineCollection
+from matplotlib.colors import BoundaryNorm
+from matplotlib.figure import Figure
+from ngsolve import IfPos, x, y
+
+from ngswell import (
+    TABLE_2,
+    Adaptive,
+    Area,
+    Bath,
+    Blend,
+    Ledger,
+    Penalty,
+    Pin,
+    PlaneStrain,
+    Probe,
+    Progress,
+    Ramp,
+    Result,
+    Scene,
+    Snapshots,
+    Symmetry,
+    rectangle,
+)
+from ngswell.analytic import homogeneous_equilibrium
+from ngswell.plotting import on_deformed_body
+from studies.output import Findings, cost
+
+WIDTH, HEIGHT = 1.1, 1.0  # mm
+INITIAL, END, AT_REST = 7000.0, 11000.0, 2e5  # s
+SIDE = Ramp((7000, 4.1), (7080, 2.7), (7220, 0.3))  # s, mol/l: top and left
+BOTTOM = Ramp((7000, 4.1), (7080, 2.7), (8000, 2.7), (10000, 0.3))
+PICTURES = (0.0, 7000.0, 7107.0, 7224.0, 7650.0, 11000.0)  # s
+REFINEMENT = 1.5
+CORE, CORNER = (WIDTH, HEIGHT / 2), (0.0, HEIGHT)
+
+
+def scene(nx: int, ny: int) -> Scene:
+    """The block of Table 2 on nx × ny quadrilaterals; around the bottom left corner the baths blend over 0.3 mm."""
+
+    def fading(distance):  # type: ignore[no-untyped-def]
+        return 0.5 * IfPos(0.3 - distance, (0.3 - distance) / 0.3, 0.0)
+
+    weak = Penalty(40.0)
+    return Scene(
+        mesh=rectangle(WIDTH, HEIGHT, nx, ny),
+        kinematics=PlaneStrain(),
+        material=TABLE_2,
+        charge=Ramp((0, 0.0), (4000, 1.0)),
+        supports=[Symmetry("right"), Pin((0.0, 0.0), "y")],
+        baths=[
+            Bath("top", c=SIDE, treatment=weak),
+            Bath("left", c=Blend(SIDE, BOTTOM, fading(y)), treatment=weak),
+            Bath("bottom", c=Blend(BOTTOM, SIDE, fading(x)), treatment=weak),
+        ],
+    )
+
+
+@dataclass(frozen=True)
+class Course:
+    """A run of the scene with what was watched."""
+
+    scene: Scene
+    result: Result
+    area: Area
+    core: Probe
+    corner: Probe
+    ledger: Ledger
+    pictures: Snapshots
+
+    def ratio(self, time: float) -> float:
+        """Area at `time` [s] over the area at 7000 s."""
+        return float(np.interp(time, self.area.time, self.area.values) / self.initial_area)
+
+    @property
+    def initial_area(self) -> float:
+        return float(np.interp(INITIAL, self.area.time, self.area.values))
+
+    @property
+    def core_minimum(self) -> tuple[float, float]:
+        """Smallest J of the core after 7000 s, and when [s]."""
+        J = np.where(self.core.time >= INITIAL, self.core.values["J"].ravel(), np.inf)
+        return float(J.min()), float(self.core.time[np.argmin(J)])
+
+
+def course(nx: int, ny: int, tolerance: float) -> Course:
+    """Run the scene to 11000 s."""
+    block = scene(nx, ny)
+    area, core, corner, ledger = Area(), Probe(CORE, "J"), Probe(CORNER, "J"), Ledger()
+    pictures = Snapshots(PICTURES)
+    label = f"free_swelling {nx} x {ny}, tolerance {tolerance:g}"
+    result = block.run(END, Adaptive(tolerance), [area, core, corner, ledger, pictures, Progress(label)])
+    return Course(block, result, area, core, corner, ledger, pictures)
+
+
+def run(quick: bool = False) -> Findings:
+    """The scene on the paper's mesh, once finer in space, once in time, and on to rest."""
+    nx, ny, tolerance = (10, 10, 8e-3) if quick else (22, 20, 1e-3)
+    base = course(nx, ny, tolerance)
+    finer_mesh = course(round(REFINEMENT * nx), round(REFINEMENT * ny), tolerance)
+    finer_step = course(nx, ny, tolerance / 4)
+    rest = Area()
+    progress = Progress("free_swelling to rest")
+    to_rest = base.scene.run(AT_REST, Adaptive(tolerance), [rest, progress], resume=base.result.end)
+
+    swollen = homogeneous_equilibrium(TABLE_2, SIDE.values[0], "plane strain")
+    final = homogeneous_equilibrium(TABLE_2, SIDE.values[-1], "plane strain")
+    J = base.initial_area / (WIDTH * HEIGHT)
+    core_min, core_min_time = base.core_minimum
+    numbers: dict[str, float | int | str] = {
+        "initial_J": J,
+        "initial_cfc": (1 - TABLE_2.nS0) * TABLE_2.cfc0 / (J - TABLE_2.nS0),
+        "initial_nS": TABLE_2.nS0 / J,
+        "closed_form_initial_J": swollen.J,
+        "closed_form_initial_cfc": swollen.cfc,
+        "closed_form_initial_nS": swollen.nS,
+        "core_J_initial": float(np.interp(INITIAL, base.core.time, base.core.values["J"].ravel())),
+        "core_J_min": core_min,
+        "core_J_min_time_s": core_min_time,
+        "corner_J_at_core_min": float(np.interp(core_min_time, base.corner.time, base.corner.values["J"].ravel())),
+        "area_ratio_7220": base.ratio(7220.0),
+        "area_ratio_11000": base.ratio(END),
+        "area_ratio_equilibrium": float(rest.values[-1]) / base.initial_area,
+        "closed_form_area_ratio_equilibrium": final.J / swollen.J,
+    }
+    in_space = REFINEMENT**2 / (REFINEMENT**2 - 1)
+    for key, value in (
+        ("area_ratio_7220", lambda c: c.ratio(7220.0)),
+        ("area_ratio_11000", lambda c: c.ratio(END)),
+        ("core_J_min", lambda c: c.core_minimum[0]),
+    ):
+        numbers[f"{key}_mesh_error"] = in_space * (value(base) - value(finer_mesh))
+        numbers[f"{key}_step_error"] = 2 * (value(base) - value(finer_step))
+    fluid, cations = base.ledger.imbalance()
+    numbers |= {"fluid_imbalance": fluid, "cation_imbalance": cations}
+    numbers |= {"mesh": f"{nx} x {ny} quadrilaterals, order 2", "tolerance": tolerance}
+    numbers |= cost([base.result, finer_mesh.result, finer_step.result, to_rest])
+
+    courses = {"base": base, "finer mesh": finer_mesh, "finer steps": finer_step}
+    rows = [
+        (name, float(t), float(area) / c.initial_area, float(core), float(corner))
+        for name, c in courses.items()
+        for t, area, core, corner in zip(
+            c.area.time, c.area.values, c.core.values["J"].ravel(), c.corner.values["J"].ravel(), strict=True
+        )
+    ]
+    rows += [("to rest", float(t), float(a) / base.initial_area, "", "") for t, a in zip(rest.time, rest.values, strict=True)]
+    return Findings(draw(base, finer_mesh), ("run", "time_s", "area_ratio", "core_J", "corner_J"), rows, numbers)
+
+
+def draw(base: Course, finer: Course) -> Figure:
+    """Six pictures of the deformed, mirrored block, beside histories of bath, area and core."""
+    figure = plt.figure(figsize=(9.6, 6.4))
+    grid = figure.add_gridspec(3, 3, width_ratios=(1.25, 1.25, 1))
+    levels = np.linspace(-0.02, 0.16, 10)
+    norm = BoundaryNorm(levels, 256, extend="both")
+    axes: list[Axes] = []
+    for number, state in enumerate(base.pictures.states):
+        ax = figure.add_subplot(grid[number // 2, number % 2])
+        axes.append(ax)
+        base.scene.problem.restore(state)
+        half = on_deformed_body(base.scene.problem, base.scene.problem.state.p)
+        for part in (half, half.mirrored(WIDTH)):
+            ax.tricontourf(part.x, part.y, part.triangles, part.values, levels=levels, norm=norm, extend="both")
+            ax.add_collection(LineCollection(list(part.outlines), colors="k", linewidths=0.12))
+        ax.set(title=f"{state.time:g} s", aspect="equal", xlim=(-0.95, 3.15), ylim=(-0.35, 1.75))
+        ax.grid(False)
+        if number % 2 == 0:
+            ax.set_ylabel("y [mm]")
+        if number >= 4:
+            ax.set_xlabel("x [mm]")
+    figure.colorbar(ScalarMappable(norm), ax=axes, label="overall pressure p [N/mm²]", location="bottom", shrink=0.6, aspect=40)
+
+    baths, area, core = (figure.add_subplot(grid[row, 2]) for row in range(3))
+    time = np.linspace(6800, END, 2000)
+    baths.plot(time, np.interp(time, SIDE.times, SIDE.values), "k-", label="top, left")
+    baths.plot(time, np.interp(time, BOTTOM.times, BOTTOM.values), "k--", label="bottom")
+    baths.set(ylabel="bath [mol/l]", ylim=(0, None))
+    baths.legend()
+    area.plot(base.area.time, base.area.values / base.initial_area, "k-", label="paper's mesh")
+    area.plot(finer.area.time, finer.area.values / finer.initial_area, "--", color="0.5", label="finer mesh")
+    area.set(ylabel="area / area at 7000 s", ylim=(0.95, 2.25))
+    area.legend(loc="lower right")
+    core.plot(base.core.time, base.core.values["J"], "k-", label="core")
+    core.plot(base.corner.time, base.corner.values["J"], "k:", label="top corner")
+    core.set(ylabel="J", xlabel="time [s]")
+    core.legend(loc="center right")
+    for ax in (baths, area, core):
+        ax.set_xlim(6800, END)
+    return figure
