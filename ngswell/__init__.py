@@ -2,23 +2,18 @@
 
 from __future__ import annotations
 
-import os
-
-for _variable in ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):  # BLAS threads fight NGSolve's TaskManager
-    os.environ.setdefault(_variable, "1")
-
-from ngswell.baths import Bath, Frozen, Lagged, Penalty  # noqa: E402
-from ngswell.errors import InputError, NgswellError, OutputError, StepError  # noqa: E402
-from ngswell.kinematics import Confined, PlaneStrain  # noqa: E402
-from ngswell.materials import TABLE_1, TABLE_2, Material  # noqa: E402
-from ngswell.meshes import column, rectangle  # noqa: E402
-from ngswell.models import Concentration  # noqa: E402
-from ngswell.newton import Newton  # noqa: E402
-from ngswell.observers import VTK, Area, Integral, Ledger, Probe, Progress, Snapshots  # noqa: E402
-from ngswell.scene import Result, Scene  # noqa: E402
-from ngswell.schedules import Blend, Ramp  # noqa: E402
-from ngswell.stepping import Adaptive, Fixed  # noqa: E402
-from ngswell.supports import Pin, Roller, Symmetry, Traction, Weight  # noqa: E402
+from ngswell.baths import Bath, Frozen, Lagged, Penalty
+from ngswell.errors import InputError, NgswellError, OutputError, StepError
+from ngswell.kinematics import Confined, PlaneStrain
+from ngswell.materials import TABLE_1, TABLE_2, Material
+from ngswell.meshes import column, rectangle
+from ngswell.models import Concentration
+from ngswell.newton import Newton
+from ngswell.observers import VTK, Area, Integral, Ledger, Probe, Progress, Snapshots
+from ngswell.scene import Result, Scene
+from ngswell.schedules import Blend, Ramp
+from ngswell.stepping import Adaptive, Fixed
+from ngswell.supports import Pin, Roller, Symmetry, Traction, Weight
 
 __version__ = "0.1.0"
 

@@ -66,12 +66,8 @@ def homogeneous_equilibrium(
         if middle in (low, high):
             break
         low, high = (middle, high) if excess(middle) < 0 else (low, middle)
-    cfc = charge(high)
-    if boundary_charge is None:
-        c = donnan.cations(bath, cfc)
-    else:
-        c = donnan.cations(bath, boundary_charge)
-    return Equilibrium(high, cfc, nS0 / high, c, pressure(high))
+    c = donnan.cations(bath, charge(high) if boundary_charge is None else boundary_charge)
+    return Equilibrium(high, charge(high), nS0 / high, c, pressure(high))
 
 
 def lagged_column_factor(material: Material, bath: float) -> float:

@@ -49,6 +49,11 @@ class Penalty:
         if not (value is not None and 0 < value < float("inf")):
             raise InputError(f"Penalty has to be positive and finite, got {value!r}")
 
+    def __str__(self) -> str:
+        if self.relative is None:
+            return f"weak, ε = {self.epsilon:g}"
+        return f"weak, ε = {self.relative:g} K/h and D₊/h"
+
     def efflux(self, site: Site) -> tuple[CoefficientFunction, CoefficientFunction]:
         """Fluid [mm/s] and cation [mol/l mm/s] efflux per current area."""
         if self.relative is None:
@@ -66,12 +71,18 @@ class Lagged:
 
     charge_of = "last"
 
+    def __str__(self) -> str:
+        return "prescribed with the charge of the last step"
+
 
 @dataclass(frozen=True)
 class Frozen:
     """Prescribed values with the boundary charge of the start, whatever the deformation (Fig. 4, cfc = cfc0)."""
 
     charge_of = "start"
+
+    def __str__(self) -> str:
+        return "prescribed with the charge of the start"
 
 
 Treatment: TypeAlias = Penalty | Lagged | Frozen

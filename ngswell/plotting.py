@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
+from matplotlib.tri import Triangulation
 from ngsolve import CF, ET, VOL, CoefficientFunction, IntegrationRule, x, y
 from numpy.typing import NDArray
 
 from ngswell.errors import InputError
 from ngswell.problem import Problem
 
-STYLE = {
+STYLE: dict[str, Any] = {
     "font.family": "serif",
     "mathtext.fontset": "dejavuserif",
     "font.size": 9,
@@ -33,24 +35,24 @@ STYLE = {
 def use_style() -> None:
     """Draw without a display, in the figures' style."""
     mpl.use("Agg")
-    mpl.rcParams.update(STYLE)
+    for key, value in STYLE.items():
+        mpl.rcParams[key] = value  # type: ignore[index]
 
 
 @dataclass(frozen=True)
 class Picture:
-    """A scalar field on the deformed body: points x, y [mm], values, triangles, and the outline of every cell."""
+    """A scalar field on the deformed body: triangles with their values, and the outline of every cell [mm]."""
 
-    x: NDArray
-    y: NDArray
+    mesh: Triangulation
     values: NDArray
-    triangles: NDArray
     outlines: NDArray
 
     def mirrored(self, axis: float) -> Picture:
         """The other half of a body that is symmetric to x = `axis` [mm]."""
         outlines = self.outlines.copy()
         outlines[..., 0] = 2 * axis - outlines[..., 0]
-        return Picture(2 * axis - self.x, self.y, self.values, self.triangles, outlines)
+        mesh = Triangulation(2 * axis - self.mesh.x, self.mesh.y, self.mesh.triangles)
+        return Picture(mesh, self.values, outlines)
 
 
 def on_deformed_body(problem: Problem, field: CoefficientFunction, cuts: int = 3) -> Picture:
@@ -62,14 +64,10 @@ def on_deformed_body(problem: Problem, field: CoefficientFunction, cuts: int = 3
     where = problem.mesh.MapToAllElements({ET.QUAD: IntegrationRule(local, [0.0] * len(local))}, VOL)
     deformed = (CF((x, y)) + problem.state.kinematics.vector(problem.state.u))(where)
     n = cuts + 1
-    first = np.array([row * n + column for row in range(cuts) for column in range(cuts)])
-    triangles = np.concatenate([np.stack([first, first + 1, first + n + 1], 1), np.stack([first, first + n + 1, first + n], 1)])
+    corner = np.array([row * n + column for row in range(cuts) for column in range(cuts)])
+    halves = [np.stack([corner, corner + 1, corner + n + 1], 1), np.stack([corner, corner + n + 1, corner + n], 1)]
     offsets = np.arange(problem.mesh.ne) * len(local)
+    triangles = (offsets[:, None, None] + np.concatenate(halves)).reshape(-1, 3)
     rim = [*range(cuts), *range(cuts, n * n - 1, n), *range(n * n - 1, n * cuts, -1), *range(n * cuts, -1, -n)]
-    return Picture(
-        deformed[:, 0],
-        deformed[:, 1],
-        field(where).ravel(),
-        (offsets[:, None, None] + triangles).reshape(-1, 3),
-        deformed[offsets[:, None] + np.array(rim)],
-    )
+    mesh = Triangulation(deformed[:, 0], deformed[:, 1], triangles)
+    return Picture(mesh, field(where).ravel(), deformed[offsets[:, None] + np.array(rim)])

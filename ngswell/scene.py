@@ -10,6 +10,7 @@ from time import perf_counter
 
 import numpy as np
 from ngsolve import CoefficientFunction, FESpace, Mesh, TaskManager, specialcf
+from threadpoolctl import threadpool_limits
 
 from ngswell.baths import Bath
 from ngswell.errors import InputError
@@ -275,7 +276,7 @@ class Scene:
         clock = perf_counter()
         started: list[Observer] = []
         try:
-            with TaskManager():
+            with TaskManager(), threadpool_limits(1, user_api="blas"):
                 for observer in observers:
                     observer.start(problem, begin, until)
                     started.append(observer)

@@ -42,7 +42,7 @@ class Control(Protocol):
 
 @dataclass(frozen=True)
 class Fixed:
-    """Steps of one size [s], shortened to land on kinks and halved only where Newton's method fails."""
+    """Steps of one size [s], shortened to land on kinks and where Newton's method fails."""
 
     step: float
 

@@ -11,7 +11,9 @@ from ngswell.errors import InputError
 
 @dataclass(frozen=True)
 class Roller:
-    """The displacement in `direction` ("x", "y"; "xy" for both) vanishes on a boundary; no flow through it."""
+    """The displacement in `direction` ("x", "y"; "xy" for both) vanishes on a boundary.
+
+    Like every boundary it is sealed unless it has a bath."""
 
     boundary: str
     direction: str

@@ -7,6 +7,7 @@ rest. Numbers (areas are relative to the area at 7000 s; errors are estimates of
 - `initial_J`, `initial_cfc` [mol/l], `initial_nS`: means over the block at 7000 s, and `closed_form_...` of each;
 - `core_J_min`, `core_J_min_time_s`: smallest J on the symmetry line at mid-height after 7000 s, `core_J_initial` before:
   negative osmosis; `corner_J_at_core_min`: J at the free top corner then;
+- `arch_max_mm`, `arch_max_time_s`: largest rise of the middle of the bottom above its corner, and when: the bending;
 - `area_ratio_7220`, `area_ratio_11000`: with `..._mesh_error` from a mesh 1.5 times finer (second order assumed) and
   `..._step_error` from a tolerance four times smaller, which halves the steps (first order); likewise for `core_J_min`;
 - `area_ratio_equilibrium`: when nothing moves any more, with `closed_form_area_ratio_equilibrium`;
@@ -25,6 +26,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.colors import BoundaryNorm
 from matplotlib.figure import Figure
 from ngsolve import IfPos, x, y
+from numpy.typing import NDArray
 
 from ngswell import (
     TABLE_2,
@@ -55,7 +57,7 @@ SIDE = Ramp((7000, 4.1), (7080, 2.7), (7220, 0.3))  # s, mol/l: top and left
 BOTTOM = Ramp((7000, 4.1), (7080, 2.7), (8000, 2.7), (10000, 0.3))
 PICTURES = (0.0, 7000.0, 7107.0, 7224.0, 7650.0, 11000.0)  # s
 REFINEMENT = 1.5
-CORE, CORNER = (WIDTH, HEIGHT / 2), (0.0, HEIGHT)
+CORE, CORNER, BOTTOM_MIDDLE = (WIDTH, HEIGHT / 2), (0.0, HEIGHT), (WIDTH, 0.0)
 
 
 def scene(nx: int, ny: int) -> Scene:
@@ -88,6 +90,7 @@ class Course:
     area: Area
     core: Probe
     corner: Probe
+    bottom: Probe
     ledger: Ledger
     pictures: Snapshots
 
@@ -100,20 +103,31 @@ class Course:
         return float(np.interp(INITIAL, self.area.time, self.area.values))
 
     @property
+    def arch(self) -> NDArray:
+        """Rise of the middle of the bottom above the pinned corner [mm]."""
+        return self.bottom.values["displacement"][:, 1]
+
+    def rows(self, name: str) -> list[tuple[object, ...]]:
+        """The watched series, a row a step, under the name of the run."""
+        series = (self.area.values / self.initial_area, self.core.values["J"], self.corner.values["J"], self.arch)
+        return [(name, *map(float, row)) for row in zip(self.area.time, *series, strict=True)]
+
+    @property
     def core_minimum(self) -> tuple[float, float]:
         """Smallest J of the core after 7000 s, and when [s]."""
-        J = np.where(self.core.time >= INITIAL, self.core.values["J"].ravel(), np.inf)
+        J = np.where(self.core.time >= INITIAL, self.core.values["J"], np.inf)
         return float(J.min()), float(self.core.time[np.argmin(J)])
 
 
 def course(nx: int, ny: int, tolerance: float) -> Course:
     """Run the scene to 11000 s."""
     block = scene(nx, ny)
-    area, core, corner, ledger = Area(), Probe(CORE, "J"), Probe(CORNER, "J"), Ledger()
+    area, ledger = Area(), Ledger()
+    core, corner, bottom = Probe(CORE, "J"), Probe(CORNER, "J"), Probe(BOTTOM_MIDDLE, "displacement")
     pictures = Snapshots(PICTURES)
     label = f"free_swelling {nx} x {ny}, tolerance {tolerance:g}"
-    result = block.run(END, Adaptive(tolerance), [area, core, corner, ledger, pictures, Progress(label)])
-    return Course(block, result, area, core, corner, ledger, pictures)
+    result = block.run(END, Adaptive(tolerance), [area, core, corner, bottom, ledger, pictures, Progress(label)])
+    return Course(block, result, area, core, corner, bottom, ledger, pictures)
 
 
 def run(quick: bool = False) -> Findings:
@@ -137,10 +151,12 @@ def run(quick: bool = False) -> Findings:
         "closed_form_initial_J": swollen.J,
         "closed_form_initial_cfc": swollen.cfc,
         "closed_form_initial_nS": swollen.nS,
-        "core_J_initial": float(np.interp(INITIAL, base.core.time, base.core.values["J"].ravel())),
+        "core_J_initial": float(np.interp(INITIAL, base.core.time, base.core.values["J"])),
         "core_J_min": core_min,
         "core_J_min_time_s": core_min_time,
-        "corner_J_at_core_min": float(np.interp(core_min_time, base.corner.time, base.corner.values["J"].ravel())),
+        "corner_J_at_core_min": float(np.interp(core_min_time, base.corner.time, base.corner.values["J"])),
+        "arch_max_mm": float(base.arch.max()),
+        "arch_max_time_s": float(base.bottom.time[np.argmax(base.arch)]),
         "area_ratio_7220": base.ratio(7220.0),
         "area_ratio_11000": base.ratio(END),
         "area_ratio_equilibrium": float(rest.values[-1]) / base.initial_area,
@@ -159,16 +175,9 @@ def run(quick: bool = False) -> Findings:
     numbers |= {"mesh": f"{nx} x {ny} quadrilaterals, order 2", "tolerance": tolerance}
     numbers |= cost([base.result, finer_mesh.result, finer_step.result, to_rest])
 
-    courses = {"base": base, "finer mesh": finer_mesh, "finer steps": finer_step}
-    rows = [
-        (name, float(t), float(area) / c.initial_area, float(core), float(corner))
-        for name, c in courses.items()
-        for t, area, core, corner in zip(
-            c.area.time, c.area.values, c.core.values["J"].ravel(), c.corner.values["J"].ravel(), strict=True
-        )
-    ]
-    rows += [("to rest", float(t), float(a) / base.initial_area, "", "") for t, a in zip(rest.time, rest.values, strict=True)]
-    return Findings(draw(base, finer_mesh), ("run", "time_s", "area_ratio", "core_J", "corner_J"), rows, numbers)
+    rows = base.rows("base") + finer_mesh.rows("finer mesh") + finer_step.rows("finer steps")
+    rows += [("to rest", float(t), float(a) / base.initial_area) for t, a in zip(rest.time, rest.values, strict=True)]
+    return Findings(draw(base, finer_mesh), ("run", "time_s", "area_ratio", "core_J", "corner_J", "arch_mm"), rows, numbers)
 
 
 def draw(base: Course, finer: Course) -> Figure:
@@ -184,30 +193,32 @@ def draw(base: Course, finer: Course) -> Figure:
         base.scene.problem.restore(state)
         half = on_deformed_body(base.scene.problem, base.scene.problem.state.p)
         for part in (half, half.mirrored(WIDTH)):
-            ax.tricontourf(part.x, part.y, part.triangles, part.values, levels=levels, norm=norm, extend="both")
+            ax.tricontourf(part.mesh, part.values, levels=levels, norm=norm, extend="both")
             ax.add_collection(LineCollection(list(part.outlines), colors="k", linewidths=0.12))
-        ax.set(title=f"{state.time:g} s", aspect="equal", xlim=(-0.95, 3.15), ylim=(-0.35, 1.75))
+        ax.set(title=f"{state.time:g} s", aspect="equal", xlim=(-0.95, 3.15), ylim=(-0.25, 1.95))
         ax.grid(False)
         if number % 2 == 0:
             ax.set_ylabel("y [mm]")
         if number >= 4:
             ax.set_xlabel("x [mm]")
-    figure.colorbar(ScalarMappable(norm), ax=axes, label="overall pressure p [N/mm²]", location="bottom", shrink=0.6, aspect=40)
+    figure.colorbar(
+        ScalarMappable(norm), ax=axes, label="overall pressure p [N/mm²]", location="bottom", shrink=0.6, aspect=40
+    )
 
     baths, area, core = (figure.add_subplot(grid[row, 2]) for row in range(3))
     time = np.linspace(6800, END, 2000)
-    baths.plot(time, np.interp(time, SIDE.times, SIDE.values), "k-", label="top, left")
-    baths.plot(time, np.interp(time, BOTTOM.times, BOTTOM.values), "k--", label="bottom")
+    baths.plot(time / 1000, np.interp(time, SIDE.times, SIDE.values), "k-", label="top, left")
+    baths.plot(time / 1000, np.interp(time, BOTTOM.times, BOTTOM.values), "k--", label="bottom")
     baths.set(ylabel="bath [mol/l]", ylim=(0, None))
     baths.legend()
-    area.plot(base.area.time, base.area.values / base.initial_area, "k-", label="paper's mesh")
-    area.plot(finer.area.time, finer.area.values / finer.initial_area, "--", color="0.5", label="finer mesh")
-    area.set(ylabel="area / area at 7000 s", ylim=(0.95, 2.25))
+    area.plot(base.area.time / 1000, base.area.values / base.initial_area, "k-", label="paper's mesh")
+    area.plot(finer.area.time / 1000, finer.area.values / finer.initial_area, "--", color="0.5", label="finer mesh")
+    area.set(ylabel="area / area at 7000 s", ylim=(0.85, 2.1))
     area.legend(loc="lower right")
-    core.plot(base.core.time, base.core.values["J"], "k-", label="core")
-    core.plot(base.corner.time, base.corner.values["J"], "k:", label="top corner")
-    core.set(ylabel="J", xlabel="time [s]")
-    core.legend(loc="center right")
+    core.plot(base.core.time / 1000, base.core.values["J"], "k-", label="core")
+    core.plot(base.corner.time / 1000, base.corner.values["J"], "k:", label="top corner")
+    core.set(ylabel="J", xlabel="time [1000 s]", ylim=(0.8, 4.3))
+    core.legend(loc="upper right", ncols=2)
     for ax in (baths, area, core):
-        ax.set_xlim(6800, END)
+        ax.set_xlim(6.8, END / 1000)
     return figure

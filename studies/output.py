@@ -72,4 +72,9 @@ def cost(results: Sequence[Result]) -> dict[str, float | int]:
 
 def _versions() -> dict[str, str]:
     versions = {f"version_{package}": importlib.metadata.version(package) for package in ("ngsolve", "numpy")}
-    return {"version_ngswell": __version__, **versions, "version_python": platform.python_version(), "linear_solver": best_solver()}
+    return {
+        "version_ngswell": __version__,
+        **versions,
+        "version_python": platform.python_version(),
+        "linear_solver": best_solver(),
+    }
