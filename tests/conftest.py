@@ -1,0 +1,47 @@
+"""Scenes that several tests use."""
+
+from __future__ import annotations
+
+import pytest
+
+from ngswell import TABLE_1, Bath, Confined, Penalty, PlaneStrain, Roller, Scene, Traction, column, donnan, rectangle
+
+P0 = donnan.pressure(0.15, 0.2, TABLE_1.RT)
+"""Overall pressure of Table 1 in 0.15 mol/l [N/mm²]: the load under which the reference state is at rest."""
+
+
+def strip(treatment=Penalty(1.0), c=0.15, cells=(1, 30), **changes) -> Scene:
+    """The strip of Fig. 8."""
+    return Scene(
+        **{
+            "mesh": rectangle(0.02, 0.5, *cells),
+            "kinematics": PlaneStrain(),
+            "material": TABLE_1,
+            "supports": [Roller("bottom", "y"), Roller("left|right", "x")],
+            "baths": [Bath("top", c=c, treatment=treatment)],
+            "loads": [Traction("top", (0.0, -P0))],
+            **changes,
+        }
+    )
+
+
+def confined_column(treatment=Penalty(1.0), c=0.15, cells=30, **changes) -> Scene:
+    """The same as a 1-d column."""
+    return Scene(
+        **{
+            "mesh": column(0.5, cells),
+            "kinematics": Confined(),
+            "material": TABLE_1,
+            "supports": [Roller("bottom", "x")],
+            "baths": [Bath("top", c=c, treatment=treatment)],
+            "loads": [Traction("top", (-P0,))],
+            **changes,
+        }
+    )
+
+
+@pytest.fixture
+def quiet(capsys):
+    """Swallow progress lines."""
+    yield
+    capsys.readouterr()

@@ -1,0 +1,197 @@
+"""Bad input is refused before any computing, by name, value and remedy."""
+
+import math
+
+import pytest
+from conftest import confined_column, strip
+from ngsolve import CF, x
+
+from ngswell import (
+    TABLE_1,
+    VTK,
+    Adaptive,
+    Bath,
+    Blend,
+    Concentration,
+    Confined,
+    Fixed,
+    Frozen,
+    InputError,
+    Integral,
+    Ledger,
+    Material,
+    OutputError,
+    Penalty,
+    Pin,
+    PlaneStrain,
+    Probe,
+    Ramp,
+    Roller,
+    Scene,
+    Snapshots,
+    Symmetry,
+    Traction,
+    Weight,
+    column,
+    rectangle,
+)
+from ngswell.analytic import homogeneous_equilibrium
+from ngswell.stability import growth_factor
+
+GOOD = {"mu": 0.24, "lam": 0.02, "nS0": 0.25, "cfc0": 0.2, "D_plus": 5e-4, "D_minus": 8e-4, "K": 1e-3}
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("mu", 0.0), ("mu", -1.0), ("mu", 2.4e5), ("lam", -0.1), ("nS0", 0.0), ("nS0", 1.0), ("nS0", 1.2), ("cfc0", -0.1),
+        ("cfc0", 200.0), ("D_plus", 0.0), ("D_minus", -1e-4), ("D_plus", 5e-10), ("K", 0.0), ("K", 1e-15), ("theta", 25.0),
+        ("mu", math.nan), ("mu", "0.24"), ("mu", True), ("theta", CF(298.0)), ("mu", CF((1.0, 2.0))),
+    ],
+)  # fmt: skip
+def test_material_out_of_range(name, value):
+    with pytest.raises(InputError, match=name):
+        Material(**{**GOOD, name: value})
+
+
+def test_material_field_out_of_range_is_found_on_the_mesh():
+    with pytest.raises(InputError, match="nS0"):
+        strip(material=Material(**{**GOOD, "nS0": 0.25 + 2 * x / 0.02}))
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"baths": [Bath("topp", c=0.15)]}, "'topp'.*bottom, left, right, top"),
+        ({"baths": [Bath("top", c=0.15), Bath("left|top", c=0.15)]}, "'top' already has a bath"),
+        ({"supports": [Roller("botom", "y")]}, "'botom'"),
+        ({"supports": [Roller("bottom", "z")]}, "'z'"),
+        ({"supports": [Roller("bottom", "")]}, "direction ''"),
+        ({"supports": [Roller("bottom", "y")]}, "translate in x"),
+        ({"supports": [Roller("left", "x")]}, "translate in y"),
+        ({"supports": [Pin((0.0, 0.0), "xy")]}, "rotate"),
+        ({"supports": [Roller("left|right", "x"), Pin((0.001, 0.0), "y")]}, "nearest"),
+        ({"supports": [Roller("left|right", "x"), Pin((0.0,), "y")]}, "2 coordinates"),
+        ({"supports": [Symmetry("top"), Roller("left", "x")]}, "Symmetry on 'top'.*bath"),
+        ({"loads": [Traction("tip", (0.0, -0.1))]}, "'tip'"),
+        ({"loads": [Traction("bottom", (0.0, -0.1))]}, "no effect"),
+        ({"loads": [Traction("top", (0.0,))]}, "2 components"),
+        ({"loads": [Weight((0.0, 0.0), (0.0, 0.0)), Weight((0.0, 0.0), (0.0, 0.0))]}, "more than one Weight"),
+        ({"kinematics": Confined()}, "1-d mesh"),
+        ({"baths": []}, "initial="),
+        ({"baths": [Bath("top", c=0.15), Bath("bottom", c=0.2)]}, "differ at the start"),
+        ({"charge": Ramp((0, -1.0))}, "charge factor"),
+    ],
+)
+def test_scene(change, words):
+    with pytest.raises(InputError, match=words):
+        strip(**change)
+
+
+def test_symmetry_needs_a_straight_boundary():
+    with pytest.raises(InputError, match="not straight"):
+        strip(supports=[Symmetry("left|bottom")])
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: Bath("top", c=0.0), "positive|excluded"),
+        (lambda: Bath("top", c=-0.15), "-0.15"),
+        (lambda: Bath("top", c=150.0), "mol/m³"),
+        (lambda: Bath("top", c=Ramp((0, 0.1), (1, -0.1))), "-0.1"),
+        (lambda: Bath("top", c=Blend(Ramp((0, 0.1)), Ramp((0, -0.1)), CF(0.5))), "-0.1"),
+        (lambda: Bath("top", c=0.15, P=1e6), "1e6 Pa"),
+        (lambda: Bath("top", c=0.15, treatment="weak"), "Penalty"),
+        (lambda: Penalty(), "relative"),
+        (lambda: Penalty(1.0, relative=1.0), "either"),
+        (lambda: Penalty(-1.0), "positive"),
+        (lambda: Penalty(relative=0.0), "positive"),
+        (lambda: Penalty(math.nan), "positive"),
+        (lambda: Ramp(), "at least one"),
+        (lambda: Ramp((0, 1), (0, 2)), "increase"),
+        (lambda: Ramp((5, 1), (4, 2)), "4 s follows 5 s"),
+        (lambda: Ramp((0, math.inf)), "finite"),
+        (lambda: Traction("top", (0.0, math.nan)), "finite"),
+        (lambda: Weight((0.0, -9.81), (0.0, 0.0)), "N/mm³"),
+        (lambda: Concentration(order=1), "order"),
+        (lambda: Fixed(0.0), "positive"),
+        (lambda: Adaptive(tolerance=-1e-3), "positive"),
+        (lambda: rectangle(1.0, -1.0, 2, 2), "positive"),
+        (lambda: column(1.0, 0), "positive"),
+        (lambda: Snapshots(-1.0), "interval"),
+        (lambda: Probe((0.0, 0.0)), "at least one quantity"),
+        (lambda: homogeneous_equilibrium(TABLE_1, 0.1, "2-d"), "plane strain"),
+        (lambda: homogeneous_equilibrium(Material(**{**GOOD, "cfc0": 0.1 + 0 * x}), 0.1, "3-d"), "varies in space"),
+    ],
+)
+def test_parts(make, words):
+    with pytest.raises(InputError, match=words):
+        make()
+
+
+@pytest.mark.parametrize(
+    ("observer", "words"),
+    [
+        (lambda: Probe((1.0, 0.5), "J"), "not a point"),
+        (lambda: Probe((0.5,), "J"), "not a point"),
+        (lambda: Probe((0.0, 0.5), "pressure"), "'pressure'.*hydraulic_pressure"),
+        (lambda: Integral("density"), "'density'"),
+        (lambda: Integral("p", boundary="side"), "'side'"),
+        (lambda: Snapshots([20.0]), "outside the run"),
+    ],
+)
+def test_observers(observer, words):
+    scene = strip()
+    with pytest.raises(InputError, match=words):
+        scene.run(10.0, Fixed(5.0), [observer()])
+
+
+def test_until_before_the_start():
+    with pytest.raises(InputError, match="not after the start"):
+        strip(start=100.0).run(50.0)
+
+
+def test_a_snapshot_of_another_scene():
+    end = confined_column().run(1.0, Fixed(1.0)).end
+    with pytest.raises(InputError, match="unknowns"):
+        strip().run(2.0, Fixed(1.0), resume=end)
+
+
+def test_growth_needs_a_step_and_an_equilibrium():
+    with pytest.raises(InputError, match="positive"):
+        growth_factor(strip(Frozen()), 0.0)
+    with pytest.raises(InputError, match="no equilibrium"):
+        growth_factor(strip(loads=[]), 1.0)
+
+
+def test_output_that_cannot_be_written(tmp_path):
+    (tmp_path / "file").write_text("not a folder")
+    for path, words in ((tmp_path / "none" / "a", "no folder"), (tmp_path / "file" / "a", "no folder")):
+        with pytest.raises(OutputError, match=words):
+            strip().run(1.0, Fixed(1.0), [VTK(path)])
+    with pytest.raises(InputError, match="'density'"):
+        strip().run(1.0, Fixed(1.0), [VTK(tmp_path / "a", "density")])
+
+
+def test_nothing_is_overwritten_unasked(tmp_path):
+    scene = confined_column()
+    scene.run(2.0, Fixed(1.0), [VTK(tmp_path / "run")])
+    before = sorted((f.name, f.stat().st_mtime_ns) for f in tmp_path.iterdir())
+    with pytest.raises(OutputError, match="overwrite=True"):
+        scene.run(2.0, Fixed(1.0), [VTK(tmp_path / "run")])
+    assert sorted((f.name, f.stat().st_mtime_ns) for f in tmp_path.iterdir()) == before
+    scene.run(1.0, Fixed(1.0), [VTK(tmp_path / "run", overwrite=True)])
+    assert len(list(tmp_path.glob("run*.vtu"))) == 2  # the old third record is gone
+
+
+def test_refusals_leave_nothing_behind():
+    scene = strip()
+    with pytest.raises(InputError):
+        scene.run(1.0, Fixed(1.0), [Ledger(), Probe((9.0, 9.0), "J")])
+    assert scene.run(1.0, Fixed(1.0)).steps[-1].time == 1.0
+
+
+def test_kinematics_are_interchangeable_only_where_they_fit():
+    with pytest.raises(InputError, match="PlaneStrain needs a 2-d mesh"):
+        Scene(mesh=column(1.0, 2), kinematics=PlaneStrain(), material=TABLE_1, baths=[Bath("top", c=0.1)])
