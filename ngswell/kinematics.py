@@ -48,7 +48,7 @@ class Confined:
         return CF(grad(u), dims=(1, 1))
 
     def vector(self, u: CoefficientFunction) -> CoefficientFunction:
-        return CF((u,))
+        return u
 
     def area_stretch(self, u: CoefficientFunction) -> CoefficientFunction:
         return CF(1.0)

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import pytest
-
 from ngswell import TABLE_1, Bath, Confined, Penalty, PlaneStrain, Roller, Scene, Traction, column, donnan, rectangle
 
+WEAK = Penalty(1.0)
 P0 = donnan.pressure(0.15, 0.2, TABLE_1.RT)
 """Overall pressure of Table 1 in 0.15 mol/l [N/mm²]: the load under which the reference state is at rest."""
 
 
-def strip(treatment=Penalty(1.0), c=0.15, cells=(1, 30), **changes) -> Scene:
+def strip(treatment=WEAK, c=0.15, cells=(1, 30), **changes) -> Scene:
     """The strip of Fig. 8."""
     return Scene(
         **{
@@ -25,7 +24,7 @@ def strip(treatment=Penalty(1.0), c=0.15, cells=(1, 30), **changes) -> Scene:
     )
 
 
-def confined_column(treatment=Penalty(1.0), c=0.15, cells=30, **changes) -> Scene:
+def confined_column(treatment=WEAK, c=0.15, cells=30, **changes) -> Scene:
     """The same as a 1-d column."""
     return Scene(
         **{
@@ -38,10 +37,3 @@ def confined_column(treatment=Penalty(1.0), c=0.15, cells=30, **changes) -> Scen
             **changes,
         }
     )
-
-
-@pytest.fixture
-def quiet(capsys):
-    """Swallow progress lines."""
-    yield
-    capsys.readouterr()

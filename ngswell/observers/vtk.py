@@ -18,7 +18,8 @@ class VTK(Observer):
 
     All the model's quantities by default, or those named. Vectors have three components and stresses nine, as VTK readers
     expect. `subdivision` splits each element edge 2^n times, so that quadratic displacements show. Existing series are
-    kept unless `overwrite`; then the old series is removed as a whole. Raises OutputError before any computing.
+    kept unless `overwrite`; then the old series is removed as a whole. Raises OutputError before any computing, and
+    InputError on a 1-d mesh.
     """
 
     def __init__(
@@ -33,6 +34,8 @@ class VTK(Observer):
         self.path, self.quantities, self.subdivision, self.overwrite = Path(path), quantities, subdivision, overwrite
 
     def start(self, problem: Problem, begin: float, until: float) -> None:
+        if problem.mesh.dim == 1:  # NGSolve's writer leaves coordinates and derivatives of 1-d meshes unset
+            raise InputError("VTK: NGSolve writes no 1-d meshes; watch a column with Probe, or run it as a strip")
         outputs = problem.state.outputs()
         for name in self.quantities:
             if name not in outputs:

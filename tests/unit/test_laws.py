@@ -47,7 +47,9 @@ def gradients(c, cfc, RT, bath_gradient=0.0):
 
 
 def flows(material, c, cfc, grad_p, grad_c, grad_cfc, nF=0.8):
-    return [at(flux) for flux in laws.transport(material, CF(nF), CF(c), CF(cfc), *map(tuple_field, (grad_p, grad_c, grad_cfc)))]
+    return [
+        at(flux) for flux in laws.transport(material, CF(nF), CF(c), CF(cfc), *map(tuple_field, (grad_p, grad_c, grad_cfc)))
+    ]
 
 
 def tuple_field(values):

@@ -172,10 +172,13 @@ def test_output_that_cannot_be_written(tmp_path):
             strip().run(1.0, Fixed(1.0), [VTK(path)])
     with pytest.raises(InputError, match="'density'"):
         strip().run(1.0, Fixed(1.0), [VTK(tmp_path / "a", "density")])
+    with pytest.raises(InputError, match="1-d"):
+        confined_column().run(1.0, Fixed(1.0), [VTK(tmp_path / "a")])
+    assert not list(tmp_path.glob("a*"))
 
 
 def test_nothing_is_overwritten_unasked(tmp_path):
-    scene = confined_column()
+    scene = strip()
     scene.run(2.0, Fixed(1.0), [VTK(tmp_path / "run")])
     before = sorted((f.name, f.stat().st_mtime_ns) for f in tmp_path.iterdir())
     with pytest.raises(OutputError, match="overwrite=True"):

@@ -1,0 +1,208 @@
+"""The discrete system: linearisation, named terms, boundary measure, solvers, Newton's tests."""
+
+import numpy as np
+import pytest
+from conftest import confined_column, strip
+from ngsolve import IfPos, x, y
+
+from ngswell import (
+    TABLE_2,
+    Bath,
+    Concentration,
+    Fixed,
+    Lagged,
+    Material,
+    Newton,
+    Penalty,
+    PlaneStrain,
+    Ramp,
+    Roller,
+    Scene,
+    StepError,
+    Traction,
+    Weight,
+    rectangle,
+)
+from ngswell.solvers import LinearSolver, best_solver
+
+
+def block(**changes) -> Scene:
+    """A small block with everything a scene can have, out of equilibrium."""
+    layered = Material(
+        mu=0.12 + 0.05 * y, lam=0.02, nS0=IfPos(x - 0.5, 0.25, 0.2), cfc0=0.4 + 0.3 * x, D_plus=5e-4, D_minus=8e-4, K=1.07e-3
+    )
+    return Scene(
+        **{
+            "mesh": rectangle(1.0, 1.0, 2, 2),
+            "kinematics": PlaneStrain(),
+            "material": layered,
+            "supports": [Roller("bottom", "y"), Roller("left", "x")],
+            "baths": [Bath("top", c=0.5, P=0.01, treatment=Penalty(3.0)), Bath("right", c=0.5, P=0.01)],
+            "loads": [Traction("top", (0.01, -0.02)), Weight((0.0, -1e-2), (0.0, -2e-2))],
+            **changes,
+        }
+    )
+
+
+def deformed(problem, seed=1):
+    """A state near the initial one in which every term acts."""
+    problem.initialise()
+    rng = np.random.default_rng(seed)
+    for name, size in (("u", 0.02), ("p", 0.05), ("c", 0.1), ("cfc", 0.05)):
+        part = problem.ranges[name]
+        problem.vector[part] += size * rng.standard_normal(part.stop - part.start)
+
+
+@pytest.mark.parametrize("order", [2, 3])
+def test_linearisation_is_the_derivative_of_the_residual(order):
+    problem = block(model=Concentration(order=order)).problem
+    deformed(problem)
+    problem.begin_step(1.0, 0.7)
+    state = problem.vector.copy()
+    direction = np.random.default_rng(2).standard_normal(state.size) * 0.01
+    vector, plus, minus = (problem.fields.vec.CreateVector() for _ in range(3))
+    vector.FV().NumPy()[:] = direction
+    exact = (problem.linearise() * vector).Evaluate().FV().NumPy().copy()
+    errors = []
+    for h in (1e-2, 5e-3):
+        problem.vector[:] = state + h * direction
+        problem.residual(plus)
+        problem.vector[:] = state - h * direction
+        problem.residual(minus)
+        difference = (plus.FV().NumPy() - minus.FV().NumPy()) / (2 * h)
+        errors.append(np.abs(difference - exact).max() / np.abs(exact).max())
+    assert errors[1] < 1e-4
+    assert errors[0] / errors[1] == pytest.approx(4, rel=0.1)  # central differences are of second order
+
+
+def test_terms_add_up_to_the_residual():
+    problem = block().problem
+    deformed(problem)
+    problem.dt.Set(0.7)
+    total, part = problem.fields.vec.CreateVector(), problem.fields.vec.CreateVector()
+    problem._old_contents[:] = 0.0
+    problem.residual(total)
+    summed = np.zeros(total.size)
+    for term in problem.terms:
+        problem.form(term).Apply(problem.fields.vec, part)
+        assert np.abs(part.FV().NumPy()).max() > 0, f"{term} does nothing"
+        summed += part.FV().NumPy() / (0.7 if term.kind == "rate" else 1.0)
+    assert summed == pytest.approx(total.FV().NumPy(), abs=1e-13)
+
+
+def test_a_scene_has_only_the_terms_it_needs():
+    bare = strip().describe()
+    assert "weight" not in bare
+    assert "traction on top" in bare
+    assert "efflux on top" in bare
+    assert "efflux" not in strip(Lagged()).describe()
+    assert "traction" not in strip(loads=[]).describe()
+    assert "weight" in block().describe()
+
+
+def test_efflux_is_per_current_area():
+    # Stretch the strip sideways by 20 %, lift p and c on top: the efflux is ε (p − p_D) times the deformed width.
+    problem = strip(supports=[Roller("bottom", "y"), Roller("left", "x")]).problem
+    problem.initialise()
+    problem.fields.components[0].Set((0.2 * x, 0 * x))
+    problem.vector[problem.ranges["p"]] += 0.01
+    efflux = next(t for t in problem.terms if (t.balance, t.name) == ("fluid", "efflux"))
+    vector = problem.fields.vec.CreateVector()
+    problem.form(efflux).Apply(problem.fields.vec, vector)
+    total = vector.FV().NumPy()[problem.ranges["p"]].sum()
+    assert total == pytest.approx(0.01 * 0.02 * 1.2, rel=1e-12)
+
+
+@pytest.mark.parametrize(("treatment", "h"), [(Penalty(relative=1e3), 0.5 / 30)])
+def test_relative_penalty_is_a_multiple_of_K_over_h(treatment, h):
+    raw = Penalty(1e3 * 1.07e-3 / h)
+    results = []
+    for each in (treatment, raw):
+        problem = confined_column(each).problem
+        problem.initialise()
+        problem.vector[problem.ranges["p"]] += 0.01
+        efflux = next(t for t in problem.terms if (t.balance, t.name) == ("fluid", "efflux"))
+        vector = problem.fields.vec.CreateVector()
+        problem.form(efflux).Apply(problem.fields.vec, vector)
+        results.append(vector.FV().NumPy().sum())
+    assert results[0] == pytest.approx(results[1], rel=1e-12)
+
+
+@pytest.mark.parametrize("name", sorted({"umfpack", best_solver()}))
+def test_refactorisation_follows_the_matrix(name):
+    problem = block().problem
+    deformed(problem)
+    solver = LinearSolver(problem.free, name)
+    right, solution = problem.fields.vec.CreateVector(), problem.fields.vec.CreateVector()
+    free = np.array(list(problem.free))
+    right.FV().NumPy()[:] = np.random.default_rng(3).standard_normal(right.size) * free
+    for dt in (1.0, 100.0):
+        problem.dt.Set(dt)
+        matrix = problem.linearise()
+        assert solver.factorise(matrix)
+        assert solver.solve(right, solution)
+        back = (matrix * solution).Evaluate().FV().NumPy()
+        assert back[free] == pytest.approx(right.FV().NumPy()[free], abs=1e-8)
+    assert solver.factorisations == 2
+
+
+def test_nan_in_the_matrix_is_noticed():
+    problem = block().problem
+    problem.initialise()
+    matrix = problem.linearise()
+    matrix.AsVector().FV().NumPy()[7] = np.nan
+    assert not LinearSolver(problem.free).factorise(matrix)
+
+
+def test_newton_does_not_depend_on_units():
+    """The same scene with a stress and a length scaled: the same iterations, scaled results."""
+    counts, ends = [], []
+    for stress in (1.0, 1e-3):
+        material = Material(
+            mu=0.12 * stress, lam=0.02 * stress, nS0=0.25, cfc0=0.8, D_plus=5e-4, D_minus=8e-4, K=1.07e-3 / stress,
+            theta=298.0,
+        )  # fmt: skip
+        scene = Scene(
+            mesh=rectangle(1.0, 1.0, 3, 3),
+            kinematics=PlaneStrain(),
+            material=material,
+            supports=[Roller("bottom", "y"), Roller("left", "x")],
+            baths=[Bath("top", c=4.0, P=0.0, treatment=Penalty(relative=1e3))],
+            initial=(4.0, 0.0),
+            loads=[Traction("top", (0.0, -0.05 * stress))],
+            charge=Ramp((0, 1e-9)),
+        )
+        result = scene.run(10.0, Fixed(5.0))
+        counts.append([step.iterations for step in result.steps])
+        ends.append(scene.problem.vector[scene.problem.ranges["u"]].copy())
+    assert counts[0] == counts[1]
+    assert ends[0] == pytest.approx(ends[1], rel=1e-6, abs=1e-9)
+
+
+def test_a_step_that_cannot_succeed_restores_the_last_state():
+    # A load that squeezes out more fluid than there is: the compression point is never passed.
+    scene = strip(loads=[Traction("top", (0.0, -900.0))], c=0.15)
+    with pytest.raises(StepError) as caught:
+        scene.run(1e4, Fixed(100.0), newton=Newton(most_iterations=4))
+    error = caught.value
+    problem = scene.problem
+    assert error.time < 1e4
+    assert error.reason
+    assert f"t = {error.time:.10g} s" in str(error)
+    assert problem.inadmissible() is None
+    assert np.isfinite(problem.vector).all()
+    if error.time == 0.0:
+        assert problem.vector == pytest.approx(problem.initial, abs=0)
+
+
+def test_table_2_is_admissible_and_a_passed_pole_is_not():
+    problem = strip(material=TABLE_2, loads=[]).problem
+    problem.initialise()
+    assert problem.inadmissible() is None
+    problem.fields.components[0].Set((0 * x, -0.8 * y))
+    name, where = problem.inadmissible()
+    assert "J − nS0" in name
+    assert len(where) == 2
+    problem.initialise()
+    problem.vector[problem.ranges["c"]] = np.nan
+    assert problem.inadmissible() is not None
