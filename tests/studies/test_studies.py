@@ -1,0 +1,94 @@
+"""Each study at its quick size, through the command line; its numbers with reasons."""
+
+import csv
+import json
+
+import pytest
+
+from studies.__main__ import STUDIES, main
+
+META = {
+    "mesh",
+    "steps",
+    "rejected_steps",
+    "newton_iterations",
+    "seconds",
+    "version_ngswell",
+    "version_ngsolve",
+    "linear_solver",
+}
+
+
+def quick(name, folder):
+    assert main([name, "--quick", "--out", str(folder)]) == 0
+    assert (folder / f"{name}.png").stat().st_size > 10_000
+    with open(folder / f"{name}.csv", encoding="utf-8") as file:
+        rows = list(csv.reader(file))
+    assert len({len(row) for row in rows[:5]}) == 1
+    numbers = json.loads((folder / f"{name}.json").read_text(encoding="utf-8"))
+    assert numbers.keys() >= META
+    return numbers, rows
+
+
+def test_boundary_charge(tmp_path):
+    numbers, rows = quick("boundary_charge", tmp_path)
+    # The homogeneous end state lies in the discrete space: what is left is the relaxation, of which large last steps of
+    # backward Euler remove only a factor 1/(1 + Δt/τ) each.
+    assert numbers["following_final_mm"] == pytest.approx(numbers["closed_form_following_mm"], rel=1e-5)
+    assert numbers["frozen_final_mm"] == pytest.approx(numbers["closed_form_frozen_mm"], rel=1e-5)
+    assert numbers["following_final_mm"] == pytest.approx(0.01341, rel=2e-3)
+    assert numbers["frozen_final_mm"] == pytest.approx(0.02439, rel=2e-3)
+    assert {row[0] for row in rows[1:]} == {"following", "frozen"}
+
+
+def test_oscillation(tmp_path):
+    numbers, rows = quick("oscillation", tmp_path)
+    assert numbers["lagged_growth_per_step"] < -2
+    for key in [k for k in numbers if k.endswith("_predicted")]:
+        measured = numbers["lagged_growth_per_step" if key == "lagged_growth_predicted" else key.removesuffix("_predicted")]
+        # Some ten clean steps between round-off and the first effect of nonlinearity.
+        assert measured == pytest.approx(numbers[key], rel=5e-3)
+    growth = [numbers[f"lagged_growth_at_{dt}_s"] for dt in ("0.1", "1", "10", "100")]
+    assert all(g < -2.5 for g in growth)  # three decades of time steps, no cure
+    assert 15 < numbers["lagged_visible_step"] < 40  # ln(1e-6/1e-17) / ln 3 and the time to find the mode
+    assert numbers["lagged_max_mm"] > 1e-5
+    assert numbers["weak_max_mm"] < 1e-12
+    assert numbers["column_factor"] == pytest.approx(-0.733, abs=5e-4)
+    assert {row[0] for row in rows[1:]} == {"lagged", "weak"}
+
+
+def test_free_swelling(tmp_path):
+    numbers, _ = quick("free_swelling", tmp_path)
+    # 7000 s leave some e^(-7) of the relaxation of the core; the figures' size of the study is held to 0.1 %.
+    for key in ("initial_J", "initial_cfc", "initial_nS"):
+        assert numbers[key] == pytest.approx(numbers[f"closed_form_{key}"], rel=2e-3)
+    assert numbers["closed_form_area_ratio_equilibrium"] == pytest.approx(2.164, abs=1e-3)
+    assert numbers["area_ratio_equilibrium"] == pytest.approx(numbers["closed_form_area_ratio_equilibrium"], rel=2e-3)
+    # Negative osmosis: the core shrinks while the corner swells to the final J and beyond.
+    assert numbers["core_J_min"] < numbers["core_J_initial"] - 0.2
+    assert numbers["corner_J_at_core_min"] > 2.5
+    assert 7220 < numbers["core_J_min_time_s"] < 8000
+    # Transient numbers within their own error estimates (doubled) of the full study's: 0.940, 1.950 and 1.092.
+    for key, value in (("area_ratio_7220", 0.940), ("area_ratio_11000", 1.950), ("core_J_min", 1.092)):
+        errors = abs(numbers[f"{key}_mesh_error"]) + abs(numbers[f"{key}_step_error"])
+        assert abs(numbers[key] - value) < 2 * errors + 1e-3
+        assert errors < 0.03
+    assert numbers["fluid_imbalance"] < 1e-9
+    assert numbers["cation_imbalance"] < 1e-9
+
+
+def test_output_is_refused_before_computing(tmp_path, capsys):
+    (tmp_path / "oscillation.json").write_text("mine")
+    assert main(["oscillation", "--quick", "--out", str(tmp_path)]) == 1
+    assert "--overwrite" in capsys.readouterr().err
+    assert (tmp_path / "oscillation.json").read_text() == "mine"
+    (tmp_path / "file").write_text("")
+    assert main(["oscillation", "--out", str(tmp_path / "file" / "deeper")]) == 1
+    assert "cannot be made" in capsys.readouterr().err
+
+
+def test_an_unknown_study_lists_the_known_ones(capsys):
+    with pytest.raises(SystemExit):
+        main(["swelling"])
+    message = capsys.readouterr().err
+    assert all(name in message for name in STUDIES)
