@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from ngsolve import (
@@ -33,6 +34,9 @@ from ngswell.quadrature import points
 from ngswell.schedules import Signal
 from ngswell.supports import Traction, Weight
 
+if TYPE_CHECKING:
+    from ngswell.scene import Scene
+
 BONUS_ORDER = 2
 """Extra integration order: the pulled-back terms are rational in F."""
 
@@ -61,14 +65,13 @@ class Problem:
     old state. Linearisations are NGSolve's.
     """
 
-    def __init__(self, scene) -> None:  # type: ignore[no-untyped-def]  # Scene imports this module
+    def __init__(self, scene: Scene) -> None:
         self.scene = scene
         self.mesh, self.model, self.kinematics = scene.mesh, scene.model, scene.kinematics
         material = scene.material
 
-        strong = [bath for bath in scene.baths if not isinstance(bath.treatment, Penalty)]
-        self.essential = "|".join(bath.boundary for bath in strong)
-        self.space = self.model.space(self.mesh, self.kinematics, scene.held(), self.essential)
+        essential = "|".join(bath.boundary for bath in scene.baths if not isinstance(bath.treatment, Penalty))
+        self.space = self.model.space(self.mesh, self.kinematics, scene.held(), essential)
         self.fields = GridFunction(self.space)
         self.names = self.model.unknowns
         spans = [self.space.Range(i) for i in range(len(self.names))]
@@ -91,7 +94,7 @@ class Problem:
             self._system += self._integral(term, 1 / self.dt if term.kind == "rate" else None)
             if term.kind == "rate":
                 self._contents += self._integral(term, None)
-        self._start_charge = GridFunction(self._component("cfc").space)
+        self._start_charge, self._last_charge = (GridFunction(self._component("cfc").space) for _ in range(2))
         self._old_contents = self.fields.vec.CreateVector()
 
     # -- forms ---------------------------------------------------------------------------------------------------------
@@ -122,7 +125,7 @@ class Problem:
                 terms.append(Term("momentum", "traction", -power, boundary=load.boundary))
         return terms
 
-    def _integral(self, term: Term, factor):  # type: ignore[no-untyped-def]
+    def _integral(self, term: Term, factor: Any) -> Any:
         integrand = (term.integrand if factor is None else factor * term.integrand).Compile()
         if term.boundary is not None:
             return integrand * ds(definedon=self.mesh.Boundaries(term.boundary), bonus_intorder=BONUS_ORDER)
@@ -191,39 +194,32 @@ class Problem:
         """Prepare the step that ends at `time`: history, parameters, prescribed values; `guess` as first iterate."""
         self._contents.Apply(self.fields.vec, self._old_contents)
         self.dt.Set(dt)
-        prescribed = {entry.bath.boundary: self._charge_at(entry.bath) for entry in self._baths if self._is_strong(entry)}
+        self._last_charge.vec.data = self._component("cfc").vec
         self.set_time(time)
-        values = self._prescribed_values(prescribed)
+        values = self._prescribed_values()
         if guess is not None:
             self.vector[:] = guess
         for dofs, numbers in values:
             self.vector[dofs] = numbers
 
-    def _is_strong(self, entry: _BathInForms) -> bool:
-        return not isinstance(entry.bath.treatment, Penalty)
-
-    def _charge_at(self, bath: Bath) -> GridFunction:
-        if bath.treatment.charge_of == "start":  # type: ignore[union-attr]
-            return self._start_charge
-        last = GridFunction(self._start_charge.space)
-        last.vec.data = self._component("cfc").vec
-        return last
-
-    def _prescribed_values(self, charges: dict[str, GridFunction]) -> list[tuple[NDArray, NDArray]]:
+    def _prescribed_values(self) -> list[tuple[NDArray, NDArray]]:
+        """Degrees of freedom and values of p and c on the boundaries of strongly treated baths."""
         found = []
         for entry in self._baths:
-            if not self._is_strong(entry):
+            if isinstance(entry.bath.treatment, Penalty):
                 continue
-            region = self.mesh.Boundaries(entry.bath.boundary)
-            cfc, bath = charges[entry.bath.boundary], entry.concentration.field
-            values = self.model.equilibrium(bath, entry.hydraulic.field, cfc, self.scene.material.RT)
-            for name, value in values.items():
-                space = self._component(name).space
-                on_boundary = GridFunction(space)
-                on_boundary.Set(value, definedon=region)
-                dofs = np.flatnonzero(list(space.GetDofs(region)))
+            cfc = self._start_charge if entry.bath.treatment.charge_of == "start" else self._last_charge
+            bath, hydraulic = entry.concentration.field, entry.hydraulic.field
+            for name, value in self.model.equilibrium(bath, hydraulic, cfc, self.scene.material.RT).items():
+                on_boundary = GridFunction(self._component(name).space)
+                on_boundary.Set(value, definedon=self.mesh.Boundaries(entry.bath.boundary))
+                dofs = self._boundary_dofs(name, entry.bath.boundary)
                 found.append((self.ranges[name].start + dofs, on_boundary.vec.FV().NumPy()[dofs]))
         return found
+
+    @cache  # noqa: B019  # a scene keeps its problem anyway
+    def _boundary_dofs(self, name: str, boundary: str) -> NDArray:
+        return np.flatnonzero(list(self._component(name).space.GetDofs(self.mesh.Boundaries(boundary))))
 
     # -- the discrete system -------------------------------------------------------------------------------------------
 
@@ -250,7 +246,7 @@ class Problem:
         return CF((x, y, z)[: self.mesh.dim])(self._quadrature)
 
     @cached_property
-    def _bounds(self) -> list[tuple[str, object]]:
+    def _bounds(self) -> list[tuple[str, Any]]:
         s = self.state
         return [
             ("fluid content J − nS0", (s.J - s.material.nS0).Compile()),
@@ -260,7 +256,7 @@ class Problem:
     def inadmissible(self) -> tuple[str, tuple[float, ...]] | None:
         """What leaves the physical range (J − nS0 > 0, c > 0) at a quadrature point, and where; None if nothing does."""
         for name, field in self._bounds:
-            values = field(self._quadrature).ravel()  # type: ignore[operator]
+            values = field(self._quadrature).ravel()
             worst = int(np.argmin(np.where(np.isfinite(values), values, -np.inf)))
             if not values[worst] > 0:
                 return name, tuple(self._positions[worst])

@@ -6,6 +6,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from math import inf
 from time import perf_counter
 
 import numpy as np
@@ -260,8 +261,8 @@ class Scene:
         succeeds; the problem's fields then hold the last accepted state.
         """
         begin = self.start if resume is None else resume.time
-        if not until > begin:
-            raise InputError(f"until = {until:g} s is not after the start at {begin:g} s")
+        if not begin < until < inf:
+            raise InputError(f"until = {until:g} s is not a time after the start at {begin:g} s")
         control = Adaptive() if steps is None else steps
         problem = self.problem
         if resume is not None and resume.values.shape != problem.vector.shape:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from math import inf
 from typing import Protocol
 
@@ -101,9 +101,9 @@ SMALLEST_STEP = 1e-10
 
 @dataclass
 class _History:
-    """The last two accepted states since the last kink, for extrapolation and the error estimate."""
+    """Largest change of each field so far, and the state and step before the present one unless a kink lies between."""
 
-    changes: dict[str, float] = field(default_factory=dict)
+    changes: dict[str, float]
     previous: NDArray | None = None
     dt: float = 0.0
 
@@ -152,23 +152,17 @@ class BackwardEuler:
                 if self.control.accepts(error) or jumps:
                     break
                 last_error = error
-                rejected.append(f"dt = {dt:.3g} s: error {error:.2g}")
+                reason, (field, where) = f"error {error:.2g}", problem.worst(problem.vector - old)
                 self.wanted = self.control.next(dt, error)
             else:
-                rejected.append(f"dt = {dt:.3g} s: {outcome.reason}")
+                reason, field, where = outcome.reason, outcome.field, outcome.where
                 self.wanted = dt / 4
+            rejected.append(f"dt = {dt:.3g} s: {reason}")
             problem.vector[:] = old
             problem.set_time(time)
             if self.wanted < SMALLEST_STEP * to_kink:
-                reason = outcome.reason or f"the error estimate stays at {error:.2g}"
-                raise StepError(
-                    time,
-                    dt,
-                    outcome.field or "-",
-                    outcome.where,
-                    reason,
-                    "Remedies: a gentler ramp, a finer mesh where the field is worst, a weaker penalty.",
-                )
+                remedy = "Remedies: a gentler ramp, a finer mesh where the field is worst, a weaker penalty."
+                raise StepError(time, dt, field, where, reason, remedy)
         history.previous, history.dt = old, dt
         for name in problem.model.evolving:
             history.changes[name] = max(self._change(name), self._change_so_far(name))

@@ -148,7 +148,7 @@ def test_observers(observer, words):
 
 
 def test_until_before_the_start():
-    with pytest.raises(InputError, match="not after the start"):
+    with pytest.raises(InputError, match="not a time after the start"):
         strip(start=100.0).run(50.0)
 
 
