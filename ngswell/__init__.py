@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from ngswell.baths import Bath, Frozen, Lagged, Penalty
+from ngswell.baths import Bath, Essential, Frozen, Lagged, Penalty
 from ngswell.errors import InputError, NgswellError, OutputError, StepError
-from ngswell.kinematics import Confined, PlaneStrain
+from ngswell.kinematics import Axisymmetric, Confined, PlaneStrain, Solid
 from ngswell.materials import TABLE_1, TABLE_2, Material
 from ngswell.meshes import column, rectangle
-from ngswell.models import Concentration
+from ngswell.models import Concentration, LocalDonnan, Uncharged
 from ngswell.newton import Newton
 from ngswell.observers import VTK, Area, Integral, Ledger, Probe, Progress, Snapshots
 from ngswell.scene import Result, Scene
@@ -18,8 +18,9 @@ from ngswell.supports import Pin, Roller, Symmetry, Traction, Weight
 __version__ = "0.1.0"
 
 __all__ = [
-    "TABLE_1", "TABLE_2", "VTK", "Adaptive", "Area", "Bath", "Blend", "Concentration", "Confined", "Fixed", "Frozen",
-    "InputError", "Integral", "Lagged", "Ledger", "Material", "Newton", "NgswellError", "OutputError", "Penalty", "Pin",
-    "PlaneStrain", "Probe", "Progress", "Ramp", "Result", "Roller", "Scene", "Snapshots", "StepError", "Symmetry",
-    "Traction", "Weight", "column", "rectangle",
+    "TABLE_1", "TABLE_2", "VTK", "Adaptive", "Area", "Axisymmetric", "Bath", "Blend", "Concentration", "Confined",
+    "Essential", "Fixed", "Frozen", "InputError", "Integral", "Lagged", "Ledger", "LocalDonnan", "Material",
+    "Newton", "NgswellError", "OutputError", "Penalty", "Pin", "PlaneStrain", "Probe", "Progress", "Ramp",
+    "Result", "Roller", "Scene", "Snapshots", "Solid", "StepError", "Symmetry", "Traction", "Uncharged", "Weight",
+    "column", "rectangle",
 ]  # fmt: skip

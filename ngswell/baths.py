@@ -11,27 +11,21 @@ from typing import NamedTuple, TypeAlias
 
 from ngsolve import CoefficientFunction
 
-from ngswell import donnan
 from ngswell.errors import InputError
-from ngswell.materials import Material
+from ngswell.materials import Field, Material
 from ngswell.schedules import Schedule, schedule
 
 
-class Site(NamedTuple):
-    """What a weak treatment sees on its boundary: the fields there, the bath, the material and the cell size h [mm]."""
+class BathFields(NamedTuple):
+    """A bath in the forms: salt concentration c̄ [mol/l] (None without ions) and hydraulic pressure P̄ [N/mm²]."""
 
-    p: CoefficientFunction
     c: CoefficientFunction
-    cfc: CoefficientFunction
-    bath: CoefficientFunction
-    hydraulic: CoefficientFunction
-    material: Material
-    h: float
+    P: CoefficientFunction
 
 
 @dataclass(frozen=True)
 class Penalty:
-    """Donnan equilibrium imposed weakly, the third terms of (27) and (32), with the sign that makes them coercive:
+    """Equilibrium imposed weakly, the third terms of (27) and (32), with the sign that makes them coercive:
 
         fluid efflux q̄ = ε (p − p_D),   cation efflux j̄ = ε (c − c_D)    per current area.
 
@@ -54,15 +48,11 @@ class Penalty:
             return f"weak, ε = {self.epsilon:g}"
         return f"weak, ε = {self.relative:g} K/h and D₊/h"
 
-    def efflux(self, site: Site) -> tuple[CoefficientFunction, CoefficientFunction]:
-        """Fluid [mm/s] and cation [mol/l mm/s] efflux per current area."""
+    def factors(self, material: Material, h: float) -> tuple[Field, Field]:
+        """ε for p [mm³/(N s)] and for c [mm/s] on a boundary whose cells have the size h [mm]."""
         if self.relative is None:
-            for_p = for_c = self.epsilon
-        else:
-            for_p = self.relative * site.material.K / site.h
-            for_c = self.relative * site.material.D_plus / site.h
-        p_D = donnan.pressure(site.bath, site.cfc, site.material.RT, site.hydraulic)
-        return for_p * (site.p - p_D), for_c * (site.c - donnan.cations(site.bath, site.cfc))
+            return self.epsilon, self.epsilon
+        return self.relative * material.K / h, self.relative * material.D_plus / h
 
 
 @dataclass(frozen=True)
@@ -85,24 +75,35 @@ class Frozen:
         return "prescribed with the charge of the start"
 
 
-Treatment: TypeAlias = Penalty | Lagged | Frozen
+@dataclass(frozen=True)
+class Essential:
+    """Prescribed values, for models whose unknowns in equilibrium with a bath do not depend on the charge."""
+
+    charge_of = None
+
+    def __str__(self) -> str:
+        return "prescribed"
+
+
+Treatment: TypeAlias = Penalty | Lagged | Frozen | Essential
 
 
 @dataclass(frozen=True)
 class Bath:
     """A salt bath on a boundary ("top" or "top|left").
 
-    `c` is the salt concentration c̄ [mol/l], `P` the hydraulic pressure P̄ [N/mm²]; each a number or a schedule. Raises
-    InputError for a concentration that is not positive or beyond 10 mol/l.
+    `c` is the salt concentration c̄ [mol/l] (none for models without ions), `P` the hydraulic pressure P̄ [N/mm²]; each a
+    number or a schedule. Without a `treatment` the model's default applies. Raises InputError for a concentration that is
+    not positive or beyond 10 mol/l.
     """
 
     boundary: str
-    c: float | Schedule
+    c: float | Schedule | None = None
     P: float | Schedule = 0.0
-    treatment: Treatment = Penalty(relative=1e4)
+    treatment: Treatment | None = None
 
     def __post_init__(self) -> None:
-        for value in self.concentration.values:
+        for value in () if self.concentration is None else self.concentration.values:
             if not 0 < value <= 10:
                 raise InputError(
                     f"bath on {self.boundary!r}: concentration {value:g} mol/l is outside 0 … 10 (0 excluded; "
@@ -111,15 +112,21 @@ class Bath:
         for value in self.pressure.values:
             if not abs(value) <= 1e3:
                 raise InputError(f"bath on {self.boundary!r}: P = {value:g} N/mm² is beyond ±1e3; 1 N/mm² = 1e6 Pa")
-        if not isinstance(self.treatment, Treatment):
+        if self.treatment is not None and not isinstance(self.treatment, Treatment):
             raise InputError(
-                f"bath on {self.boundary!r}: treatment {self.treatment!r} is none of Penalty(...), Lagged(), Frozen()"
+                f"bath on {self.boundary!r}: treatment {self.treatment!r} is none of "
+                "Penalty(...), Lagged(), Frozen(), Essential()"
             )
 
     @property
-    def concentration(self) -> Schedule:
-        return schedule(self.c)
+    def concentration(self) -> Schedule | None:
+        return None if self.c is None else schedule(self.c)
 
     @property
     def pressure(self) -> Schedule:
         return schedule(self.P)
+
+    @property
+    def schedules(self) -> list[Schedule]:
+        """Its histories."""
+        return [self.pressure] if self.concentration is None else [self.concentration, self.pressure]

@@ -27,8 +27,7 @@ from ngsolve import (
 )
 from numpy.typing import NDArray
 
-from ngswell.baths import Bath, Penalty, Site
-from ngswell.models.concentration import State
+from ngswell.baths import Bath, BathFields, Penalty, Treatment
 from ngswell.models.terms import Term
 from ngswell.quadrature import points
 from ngswell.schedules import Signal
@@ -44,8 +43,23 @@ BONUS_ORDER = 2
 @dataclass(frozen=True)
 class _BathInForms:
     bath: Bath
-    concentration: Signal
+    treatment: Treatment
+    concentration: Signal | None
     hydraulic: Signal
+
+    @property
+    def fields(self) -> BathFields:
+        return BathFields(None if self.concentration is None else self.concentration.field, self.hydraulic.field)
+
+    def set(self, time: float) -> None:
+        self.hydraulic.set(time)
+        if self.concentration is not None:
+            self.concentration.set(time)
+
+
+def _in_forms(bath: Bath, treatment: Treatment) -> _BathInForms:
+    concentration = None if bath.concentration is None else bath.concentration.signal()
+    return _BathInForms(bath, treatment, concentration, bath.pressure.signal())
 
 
 @dataclass(frozen=True)
@@ -70,7 +84,8 @@ class Problem:
         self.mesh, self.model, self.kinematics = scene.mesh, scene.model, scene.kinematics
         material = scene.material
 
-        essential = "|".join(bath.boundary for bath in scene.baths if not isinstance(bath.treatment, Penalty))
+        self._baths = [_in_forms(bath, scene.treatment(bath)) for bath in scene.baths]
+        essential = "|".join(e.bath.boundary for e in self._baths if not isinstance(e.treatment, Penalty))
         self.space = self.model.space(self.mesh, self.kinematics, scene.held(), essential)
         self.fields = GridFunction(self.space)
         self.names = self.model.unknowns
@@ -80,13 +95,16 @@ class Problem:
 
         self.dt = Parameter(1.0)
         self._charge = scene.charge.signal()
-        self._baths = [_BathInForms(b, b.concentration.signal(), b.pressure.signal()) for b in scene.baths]
 
         trials, tests = (list(functions) for functions in self.space.TnT())
         weight = next((load for load in scene.loads if isinstance(load, Weight)), None)
-        state = self.model.state(trials, material, self.kinematics, self._charge.field, weight)
-        self.terms = self.model.terms(state, tests) + self._boundary_terms(state, tests)
-        self.state = self.model.state(self.fields.components, material, self.kinematics, self._charge.field, weight)
+        bath = self._baths[0].fields if self._baths else None
+
+        def state(functions: Any) -> Any:
+            return self.model.state(functions, material, self.kinematics, self._charge.field, weight, bath)
+
+        self.terms = self.model.terms(state(trials), tests) + self._boundary_terms(state(trials), tests)
+        self.state = state(self.fields.components)
 
         self._system = BilinearForm(self.space)
         self._contents = BilinearForm(self.space)
@@ -94,39 +112,32 @@ class Problem:
             self._system += self._integral(term, 1 / self.dt if term.kind == "rate" else None)
             if term.kind == "rate":
                 self._contents += self._integral(term, None)
-        self._start_charge, self._last_charge = (GridFunction(self._component("cfc").space) for _ in range(2))
+        self._charges: dict[str | None, Any] = {None: None}
+        if "cfc" in self.names:
+            self._charges |= {of: GridFunction(self._component("cfc").space) for of in ("start", "last")}
         self._old_contents = self.fields.vec.CreateVector()
 
     # -- forms ---------------------------------------------------------------------------------------------------------
 
-    def _boundary_terms(self, state: State, tests: list) -> list[Term]:
-        v, q, d, _ = tests
+    def _boundary_terms(self, state: Any, tests: list) -> list[Term]:
         terms = []
         for entry in self._baths:
-            bath = entry.bath
-            if not isinstance(bath.treatment, Penalty):
+            if not isinstance(entry.treatment, Penalty):
                 continue
-            site = Site(
-                state.p,
-                state.c,
-                state.cfc,
-                entry.concentration.field,
-                entry.hydraulic.field,
-                state.material,
-                self.cell_size(bath.boundary),
-            )
-            fluid, cations = bath.treatment.efflux(site)
+            boundary = entry.bath.boundary
+            factors = entry.treatment.factors(self.scene.material, self.cell_size(boundary))
             stretch = self.kinematics.area_stretch(state.u)
-            terms.append(Term("fluid", "efflux", fluid * stretch * q, boundary=bath.boundary))
-            terms.append(Term("cations", "efflux", cations * stretch * d, boundary=bath.boundary))
+            for balance, efflux in self.model.weak_terms(state, tests, entry.fields, factors).items():
+                terms.append(Term(balance, "efflux", efflux * stretch, boundary=boundary))
         for load in self.scene.loads:
             if isinstance(load, Traction):
-                power = InnerProduct(CF(load.vector), self.kinematics.vector(v))
+                power = InnerProduct(CF(load.vector), tests[0])
                 terms.append(Term("momentum", "traction", -power, boundary=load.boundary))
         return terms
 
     def _integral(self, term: Term, factor: Any) -> Any:
-        integrand = (term.integrand if factor is None else factor * term.integrand).Compile()
+        factor = self.kinematics.weight if factor is None else factor * self.kinematics.weight
+        integrand = (factor * term.integrand).Compile()
         if term.boundary is not None:
             return integrand * ds(definedon=self.mesh.Boundaries(term.boundary), bonus_intorder=BONUS_ORDER)
         integral = integrand * dx(bonus_intorder=BONUS_ORDER)
@@ -162,19 +173,20 @@ class Problem:
         """Move every schedule to `time` [s]."""
         self._charge.set(time)
         for entry in self._baths:
-            entry.concentration.set(time)
-            entry.hydraulic.set(time)
+            entry.set(time)
 
     def initialise(self) -> None:
         """The reference configuration in Donnan equilibrium with the initial bath, at the scene's start."""
         self.set_time(self.scene.start)
-        bath, hydraulic = self.scene.initial_bath()
+        concentration, hydraulic = self.scene.initial_bath()
+        bath = BathFields(None if concentration is None else CF(concentration), CF(hydraulic))
         cfc = self._charge.field * self.scene.material.cfc0
         self.fields.vec[:] = 0.0
-        values = self.model.equilibrium(CF(bath), CF(hydraulic), cfc, self.scene.material.RT)
-        for name, value in {**values, "cfc": cfc}.items():
+        for name, value in self.model.equilibrium(bath, cfc, self.scene.material).items():
             self._component(name).Set(value)
-        self._start_charge.vec.data = self._component("cfc").vec
+        if "cfc" in self.names:
+            self._component("cfc").Set(cfc)
+            self._charges["start"].vec.data = self._component("cfc").vec
         self.initial = self.vector.copy()
 
     def snapshot(self, time: float) -> Snapshot:
@@ -194,7 +206,8 @@ class Problem:
         """Prepare the step that ends at `time`: history, parameters, prescribed values; `guess` as first iterate."""
         self._contents.Apply(self.fields.vec, self._old_contents)
         self.dt.Set(dt)
-        self._last_charge.vec.data = self._component("cfc").vec
+        if "cfc" in self.names:
+            self._charges["last"].vec.data = self._component("cfc").vec
         self.set_time(time)
         values = self._prescribed_values()
         if guess is not None:
@@ -206,11 +219,10 @@ class Problem:
         """Degrees of freedom and values of p and c on the boundaries of strongly treated baths."""
         found = []
         for entry in self._baths:
-            if isinstance(entry.bath.treatment, Penalty):
+            if isinstance(entry.treatment, Penalty):
                 continue
-            cfc = self._start_charge if entry.bath.treatment.charge_of == "start" else self._last_charge
-            bath, hydraulic = entry.concentration.field, entry.hydraulic.field
-            for name, value in self.model.equilibrium(bath, hydraulic, cfc, self.scene.material.RT).items():
+            cfc = self._charges[entry.treatment.charge_of]
+            for name, value in self.model.equilibrium(entry.fields, cfc, self.scene.material).items():
                 on_boundary = GridFunction(self._component(name).space)
                 on_boundary.Set(value, definedon=self.mesh.Boundaries(entry.bath.boundary))
                 dofs = self._boundary_dofs(name, entry.bath.boundary)
@@ -246,16 +258,12 @@ class Problem:
         return CF((x, y, z)[: self.mesh.dim])(self._quadrature)
 
     @cached_property
-    def _bounds(self) -> list[tuple[str, Any]]:
-        s = self.state
-        return [
-            ("fluid content J − nS0", (s.J - s.material.nS0).Compile()),
-            ("cation concentration", s.c),
-        ]
+    def _bounds(self) -> dict[str, Any]:
+        return {name: field.Compile() for name, field in self.model.bounds(self.state).items()}
 
     def inadmissible(self) -> tuple[str, tuple[float, ...]] | None:
-        """What leaves the physical range (J − nS0 > 0, c > 0) at a quadrature point, and where; None if nothing does."""
-        for name, field in self._bounds:
+        """What leaves the physical range at a quadrature point, and where; None if nothing does."""
+        for name, field in self._bounds.items():
             values = field(self._quadrature).ravel()
             worst = int(np.argmin(np.where(np.isfinite(values), values, -np.inf)))
             if not values[worst] > 0:
@@ -269,13 +277,8 @@ class Problem:
         corners = np.array([vertex.point for vertex in self.mesh.vertices])
         length = float(np.linalg.norm(corners.max(axis=0) - corners.min(axis=0)))
         charge = scene.material.largest("cfc0", self.mesh) * max(map(abs, scene.charge.values))
-        concentration = max([charge, *(value for bath in scene.baths for value in bath.concentration.values)])
-        return {
-            "u": length,
-            "p": scene.material.largest("mu", self.mesh),
-            "c": concentration,
-            "cfc": concentration,
-        }
+        baths = [value for bath in scene.baths if bath.concentration for value in bath.concentration.values]
+        return self.model.references(max([charge, *baths]), scene.material.largest("mu", self.mesh), length)
 
     def worst(self, vector: NDArray) -> tuple[str, tuple[float, ...]]:
         """The unknown with the largest entry of `vector` in units of its reference, and the vertex [mm] where it is."""

@@ -13,11 +13,11 @@ import numpy as np
 from ngsolve import CoefficientFunction, FESpace, Mesh, TaskManager, specialcf
 from threadpoolctl import threadpool_limits
 
-from ngswell.baths import Bath
+from ngswell.baths import Bath, Treatment
 from ngswell.errors import InputError
 from ngswell.kinematics import Kinematics
 from ngswell.materials import Material
-from ngswell.models import Concentration
+from ngswell.models import Concentration, Model
 from ngswell.newton import Newton
 from ngswell.observers.base import Observer
 from ngswell.problem import Problem, Snapshot
@@ -58,13 +58,13 @@ class Scene:
     mesh: Mesh
     kinematics: Kinematics
     material: Material
-    model: Concentration = Concentration()
+    model: Model = Concentration()
     supports: Sequence[Support] = ()
     baths: Sequence[Bath] = ()
     loads: Sequence[Load] = ()
     charge: Ramp = Ramp((0.0, 1.0))
     start: float = 0.0  # [s]
-    initial: tuple[float, float] | None = None
+    initial: tuple[float | None, float] | None = None
 
     def __post_init__(self) -> None:
         if self.kinematics.dimension != self.mesh.dim:
@@ -72,6 +72,7 @@ class Scene:
                 f"{type(self.kinematics).__name__} needs a {self.kinematics.dimension}-d mesh, this one is {self.mesh.dim}-d"
             )
         self.material.check_on(self.mesh)
+        self.model.check(self.material, self.baths)
         for value in self.charge.values:
             if not 0 <= value <= 100:
                 raise InputError(f"charge factor {value:g} is outside 0 … 100; it multiplies cfc0")
@@ -104,6 +105,10 @@ class Scene:
                 if name in held:
                     raise InputError(f"bath on {bath.boundary!r}: boundary {name!r} already has a bath")
                 held.add(name)
+            if not isinstance(self.treatment(bath), self.model.treatments):
+                choices = ", ".join(t.__name__ for t in self.model.treatments)
+                model = type(self.model).__name__
+                raise InputError(f"bath on {bath.boundary!r}: {model} has no {bath.treatment!r}; it has {choices}")
 
     def _check_supports(self) -> None:
         bath_boundaries = {name for bath in self.baths for name in bath.boundary.split("|")}
@@ -121,6 +126,7 @@ class Scene:
                 for name in names:
                     if name in bath_boundaries:
                         raise InputError(f"Symmetry on {name!r}: it has a bath, but nothing flows through a symmetry plane")
+        self.kinematics.check(self.mesh, self.held())
         self._check_rigid_motions()
 
     def _check_loads(self) -> None:
@@ -154,13 +160,15 @@ class Scene:
                 for vertex in element.vertices
             }
             fixed |= {self._vertex(s) for s in self.supports if isinstance(s, Pin) and direction in s.direction}
-            rows += [_rigid_motions(vertices[number])[axis] for number in fixed]
-        motions = _rigid_motions(vertices[0]).shape[1]
-        names = [f"translate in {d}" for d in directions] + ["rotate"] * (motions - len(directions))
+            rows += [self.kinematics.rigid_motions(vertices[number])[axis] for number in fixed]
+        shapes = self.kinematics.rigid_motions(vertices[0])
+        motions = shapes.shape[1]
         _, sizes, modes = np.linalg.svd(np.array(rows).reshape(-1, motions))
         rank = int((sizes > 1e-9).sum())
         if rank < motions:
-            free = names[int(np.argmax(np.abs(modes[-1])))]
+            motion = int(np.argmax(np.abs(modes[-1])))
+            uniform = (shapes[:, motion] == self.kinematics.rigid_motions(vertices[-1])[:, motion]).all()
+            free = f"translate in {directions[int(np.argmax(np.abs(shapes[:, motion])))]}" if uniform else "rotate"
             raise InputError(f"the body can {free}: add a Roller, Symmetry or Pin")
 
     def _vertex(self, pin: Pin) -> int:
@@ -196,7 +204,7 @@ class Scene:
 
     def pinned_dofs(self, space: FESpace) -> list[int]:
         """Degrees of freedom of the displacement space that pins hold."""
-        per_component = space.ndof // self.mesh.dim
+        per_component = space.ndof // len(self.kinematics.directions)
         return [
             self.kinematics.directions.index(direction) * per_component + self._vertex(pin)
             for pin in self.supports
@@ -204,7 +212,11 @@ class Scene:
             for direction in pin.direction
         ]
 
-    def initial_bath(self) -> tuple[CoefficientFunction | float, CoefficientFunction | float]:
+    def treatment(self, bath: Bath) -> Treatment:
+        """How equilibrium with `bath` is imposed: as it says, or by the model's default."""
+        return self.model.default_treatment() if bath.treatment is None else bath.treatment
+
+    def initial_bath(self) -> tuple[CoefficientFunction | float | None, CoefficientFunction | float]:
         """Salt concentration [mol/l] and hydraulic pressure [N/mm²] that the initial state is in equilibrium with."""
         if self.initial is not None:
             Bath("initial", *self.initial)
@@ -213,13 +225,12 @@ class Scene:
             raise InputError("the scene has no bath: give initial=(concentration, hydraulic pressure)")
         first = self.baths[0]
         for bath in self.baths[1:]:
-            mine = (bath.concentration.at(self.start), bath.pressure.at(self.start))
-            if mine != (first.concentration.at(self.start), first.pressure.at(self.start)):
+            if [s.at(self.start) for s in bath.schedules] != [s.at(self.start) for s in first.schedules]:
                 raise InputError(
                     f"baths on {first.boundary!r} and {bath.boundary!r} differ at the start: "
                     "give initial=(concentration, hydraulic pressure)"
                 )
-        return first.concentration.at(self.start), first.pressure.at(self.start)
+        return (first.concentration.at(self.start) if first.concentration else None), first.pressure.at(self.start)
 
     @cached_property
     def problem(self) -> Problem:
@@ -242,7 +253,7 @@ class Scene:
             ]
             lines.append(f"  {balance}: {', '.join(names)}")
         for bath in self.baths:
-            lines.append(f"  bath on {bath.boundary}: {bath.treatment}")
+            lines.append(f"  bath on {bath.boundary}: {self.treatment(bath)}")
         return "\n".join(lines)
 
     # -- running -------------------------------------------------------------------------------------------------------
@@ -267,7 +278,7 @@ class Scene:
         problem = self.problem
         if resume is not None and resume.values.shape != problem.vector.shape:
             raise InputError(f"resume: the snapshot has {resume.values.size} unknowns, the scene {problem.vector.size}")
-        schedules = [self.charge, *(s for bath in self.baths for s in (bath.concentration, bath.pressure))]
+        schedules = [self.charge, *(s for bath in self.baths for s in bath.schedules)]
         kinks = sorted({k for schedule in schedules for k in schedule.kinks if begin < k < until} | {begin, until})
         stops = sorted({s for observer in observers for s in observer.times(begin, until)})
         problem.initialise()
@@ -293,13 +304,3 @@ class Scene:
             for observer in started:
                 observer.finish(problem)
         return Result(tuple(reports), problem.snapshot(until), perf_counter() - clock)
-
-
-def _rigid_motions(point: np.ndarray) -> np.ndarray:
-    """Displacement at `point` (rows) of the rigid motions (columns): translations, then rotations."""
-    if len(point) == 1:
-        return np.eye(1)
-    if len(point) == 2:
-        return np.column_stack([np.eye(2), [-point[1], point[0]]])
-    px, py, pz = point
-    return np.column_stack([np.eye(3), [-py, px, 0.0], [pz, 0.0, -px], [0.0, -pz, py]])

@@ -170,8 +170,8 @@ def run(quick: bool = False) -> Findings:
     ):
         numbers[f"{key}_mesh_error"] = in_space * (value(base) - value(finer_mesh))
         numbers[f"{key}_step_error"] = 2 * (value(base) - value(finer_step))
-    fluid, cations = base.ledger.imbalance()
-    numbers |= {"fluid_imbalance": fluid, "cation_imbalance": cations}
+    imbalance = base.ledger.imbalance()
+    numbers |= {"fluid_imbalance": imbalance["fluid"], "cation_imbalance": imbalance["cations"]}
     numbers |= {"mesh": f"{nx} x {ny} quadrilaterals, order 2", "tolerance": tolerance}
     numbers |= cost([base.result, finer_mesh.result, finer_step.result, to_rest])
 

@@ -7,27 +7,55 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import ClassVar
 
-from ngsolve import (
-    CF,
-    H1,
-    CoefficientFunction,
-    Cof,
-    Det,
-    FESpace,
-    Id,
-    InnerProduct,
-    Inv,
-    Mesh,
-    grad,
-    sqrt,
-)
+from ngsolve import H1, CoefficientFunction, FESpace, InnerProduct, Mesh, sqrt
 
 from ngswell import donnan, laws
+from ngswell.baths import Bath, BathFields, Frozen, Lagged, Penalty
 from ngswell.errors import InputError
 from ngswell.kinematics import Kinematics
 from ngswell.materials import Field, Material
-from ngswell.models.terms import Term
+from ngswell.models.mechanics import SolidState
+from ngswell.models.terms import Term, check_order
 from ngswell.supports import Weight
+
+
+@dataclass(frozen=True)
+class State(SolidState):
+    """Displacement, overall pressure p, cation concentration c and the continuous charge field cfc."""
+
+    p: CoefficientFunction
+    c: CoefficientFunction
+    cfc: CoefficientFunction
+
+    @cached_property
+    def pore_pressure(self) -> CoefficientFunction:
+        """p with the osmotic pressure of the charge at the point in place of the smooth field's [N/mm²].
+
+        At the salt concentration c̃ = sqrt(c₊ c₋) of the bath in equilibrium with the point, (38) gives
+        p + 2 Rθ [sqrt(c̃² + cfc(J)²/4) − sqrt(c̃² + cfc²/4)], the last root being c − cfc/2.
+        """
+        root = sqrt(self.c * (self.c - self.cfc) + self.pointwise_charge * self.pointwise_charge / 4)
+        return self.p + 2 * self.material.RT * (root - self.c + self.cfc / 2)
+
+    def transport(self, frame: CoefficientFunction) -> laws.Transport:
+        """Fluxes from gradients in the `frame` (a matrix on reference gradients): `pull` or `push`."""
+        gradient = self.kinematics.flow_gradient
+        gradients = (frame * g for g in (self.drive(self.p), gradient(self.c), gradient(self.cfc)))
+        return laws.transport(self.material, self.nF, self.c, self.cfc, *gradients)
+
+    def outputs(self) -> dict[str, CoefficientFunction]:
+        """Named fields in the current configuration; `ngswell.models.OUTPUT_UNITS` has their units."""
+        flux, anions = self.transport(self.push), self.c - self.cfc
+        return {
+            **self.solid_outputs(self.pore_pressure),
+            "p": self.p,
+            "hydraulic_pressure": self.p - self.material.RT * (self.c + anions),
+            "c_plus": self.c,
+            "c_minus": anions,
+            "cfc": self.cfc,
+            "seepage": flux.fluid,
+            "cation_flux": flux.cations,
+        }
 
 
 @dataclass(frozen=True)
@@ -46,18 +74,24 @@ class Concentration:
 
     order: int = 2
 
-    unknowns = ("u", "p", "c", "cfc")
-    balances = ("momentum", "fluid", "cations", "charge")
-    evolving: ClassVar = {"u": 1e-2, "p": 1e-1, "c": 1e-1}
-    """Fields whose time error is controlled (cfc follows u), with the fraction of their reference size that the error is
-    relative to as long as they have changed by less."""
+    unknowns: ClassVar[tuple[str, ...]] = ("u", "p", "c", "cfc")
+    balances: ClassVar[tuple[str, ...]] = ("momentum", "fluid", "cations", "charge")
+    held: ClassVar[dict[str, str]] = {"fluid": "p", "cations": "c"}
+    evolving: ClassVar[dict[str, float]] = {"u": 1e-2, "p": 1e-1, "c": 1e-1}  # cfc follows u
+    treatments: ClassVar[tuple[type, ...]] = (Penalty, Lagged, Frozen)
 
     def __post_init__(self) -> None:
-        if self.order not in (2, 3, 4, 5, 6):
-            raise InputError(f"Concentration(order={self.order!r}): order 2 to 6 for u; p, c get one less")
+        check_order("Concentration", self.order)
+
+    def default_treatment(self) -> Penalty:
+        return Penalty(relative=1e4)
+
+    def check(self, material: Material, baths: Sequence[Bath]) -> None:
+        for bath in baths:
+            if bath.c is None:
+                raise InputError(f"bath on {bath.boundary!r}: Concentration needs its salt concentration c [mol/l]")
 
     def space(self, mesh: Mesh, kinematics: Kinematics, held: dict[str, str], essential: str) -> FESpace:
-        """Product space. `held` maps a direction to boundaries where u vanishes; `essential` names those with given p, c."""
         V = kinematics.space(mesh, self.order, held)
         Q = H1(mesh, order=self.order - 1)
         Q_bath = H1(mesh, order=self.order - 1, dirichlet=essential)
@@ -70,122 +104,38 @@ class Concentration:
         kinematics: Kinematics,
         charge: Field,
         weight: Weight | None,
+        bath: BathFields | None,
     ) -> State:
-        """The fields that `functions` (trial functions or components of a result, one an unknown) stand for."""
-        u, p, c, cfc = functions
-        return State(material, kinematics, u, p, c, cfc, charge, weight)
+        return State(material, kinematics, charge, weight, *functions)
 
-    def equilibrium(
-        self, bath: CoefficientFunction, hydraulic: CoefficientFunction, cfc: CoefficientFunction, RT: float
-    ) -> dict[str, CoefficientFunction]:
-        """Values of the unknowns that Donnan equilibrium (23) gives, for initial states and strong treatments."""
-        return {"p": donnan.pressure(bath, cfc, RT, hydraulic), "c": donnan.cations(bath, cfc)}
+    def equilibrium(self, bath: BathFields, cfc: CoefficientFunction, material: Material) -> dict[str, CoefficientFunction]:
+        return {"p": donnan.pressure(bath.c, cfc, material.RT, bath.P), "c": donnan.cations(bath.c, cfc)}
 
-    def terms(self, state: State, tests: list[CoefficientFunction]) -> list[Term]:
-        """The balances over the body, pulled back to the reference configuration."""
+    def terms(self, state: State, tests: Sequence[CoefficientFunction]) -> list[Term]:
         v, q, d, r = tests
         s, m = state, state.material
-        grad_v = s.kinematics.gradient(v)
-        content = laws.fluid_content(s.J, m)
-        pull = s.cofactor.trans * s.cofactor / s.J  # J F⁻¹ F⁻ᵀ
-        flux = laws.transport(m, s.nF, s.c, s.cfc, s.drive, grad(s.c), grad(s.cfc))
-        terms = [
-            Term("momentum", "solid", laws.solid_energy(s.F, m), "energy"),
-            Term("momentum", "pore pressure", -s.pore_pressure * InnerProduct(s.cofactor, grad_v)),
-            Term("fluid", "storage", content * q, "rate"),
-            Term("fluid", "seepage", -InnerProduct(pull * flux.fluid, grad(q))),
-            Term("cations", "storage", content * s.c * d, "rate"),
-            Term("cations", "diffusion and convection", -InnerProduct(pull * flux.cations, grad(d))),
-            Term("charge", "projection", (content * s.cfc - s.charge * (1 - m.nS0) * m.cfc0) * r),
+        gradient = s.kinematics.flow_gradient
+        flux = s.transport(s.pull)
+        reference_charge = s.charge * (1 - m.nS0) * m.cfc0
+        return [
+            *s.momentum(s.pore_pressure, v),
+            Term("fluid", "storage", s.content * q, "rate"),
+            Term("fluid", "seepage", -InnerProduct(flux.fluid, gradient(q))),
+            Term("cations", "storage", s.content * s.c * d, "rate"),
+            Term("cations", "diffusion and convection", -InnerProduct(flux.cations, gradient(d))),
+            Term("charge", "projection", (s.content * s.cfc - reference_charge) * r),
         ]
-        if s.weight is not None:
-            weight = m.nS0 * CF(s.weight.solid) + content * CF(s.weight.fluid)
-            terms.append(Term("momentum", "weight", -InnerProduct(weight, s.kinematics.vector(v))))
-        return terms
 
+    def weak_terms(
+        self, state: State, tests: Sequence[CoefficientFunction], bath: BathFields, factors: tuple[Field, Field]
+    ) -> dict[str, CoefficientFunction]:
+        _, q, d, _ = tests
+        wanted = self.equilibrium(bath, state.cfc, state.material)
+        for_p, for_c = factors
+        return {"fluid": for_p * (state.p - wanted["p"]) * q, "cations": for_c * (state.c - wanted["c"]) * d}
 
-@dataclass(frozen=True)
-class State:
-    """The model's fields, of trial functions or of a result: what laws, boundary conditions and outputs are written in."""
+    def references(self, concentration: float, stress: float, length: float) -> dict[str, float]:
+        return {"u": length, "p": stress, "c": concentration, "cfc": concentration}
 
-    material: Material
-    kinematics: Kinematics
-    u: CoefficientFunction
-    p: CoefficientFunction
-    c: CoefficientFunction
-    cfc: CoefficientFunction
-    charge: Field = 1.0
-    weight: Weight | None = None
-
-    @cached_property
-    def F(self) -> CoefficientFunction:
-        """Deformation gradient [-]."""
-        return Id(self.kinematics.dimension) + self.kinematics.gradient(self.u)
-
-    @cached_property
-    def J(self) -> CoefficientFunction:
-        """Volume ratio det F [-]."""
-        return Det(self.F)
-
-    @cached_property
-    def cofactor(self) -> CoefficientFunction:
-        """Cof F = J F⁻ᵀ [-]."""
-        return Cof(self.F)
-
-    @cached_property
-    def nF(self) -> CoefficientFunction:
-        """Porosity [-]."""
-        return 1 - laws.solidity(self.J, self.material)
-
-    @cached_property
-    def drive(self) -> CoefficientFunction:
-        """Reference gradient of p, less the pulled-back weight of the fluid [N/mm³]."""
-        if self.weight is None:
-            return grad(self.p)
-        return grad(self.p) - self.F.trans * CF(self.weight.fluid)
-
-    @cached_property
-    def pore_pressure(self) -> CoefficientFunction:
-        """p with the osmotic pressure of the charge at the point in place of the smooth field's [N/mm²].
-
-        At the salt concentration c̃ = sqrt(c₊ c₋) of the bath in equilibrium with the point, (38) gives
-        p + 2 Rθ [sqrt(c̃² + cfc(J)²/4) − sqrt(c̃² + cfc²/4)], the last root being c − cfc/2.
-        """
-        pointwise = laws.fixed_charge(self.J, self.material, self.charge)
-        root = sqrt(self.c * (self.c - self.cfc) + pointwise * pointwise / 4)
-        return self.p + 2 * self.material.RT * (root - self.c + self.cfc / 2)
-
-    def outputs(self) -> dict[str, CoefficientFunction]:
-        """Named fields in the current configuration, with the units that `OUTPUT_UNITS` lists."""
-        m = self.material
-        push = Inv(self.F).trans
-        flux = laws.transport(m, self.nF, self.c, self.cfc, push * self.drive, push * grad(self.c), push * grad(self.cfc))
-        anions = self.c - self.cfc
-        return {
-            "displacement": self.kinematics.vector(self.u),
-            "J": self.J,
-            "p": self.p,
-            "hydraulic_pressure": self.p - m.RT * (self.c + anions),
-            "c_plus": self.c,
-            "c_minus": anions,
-            "cfc": self.cfc,
-            "nS": laws.solidity(self.J, m),
-            "seepage": flux.fluid,
-            "cation_flux": flux.cations,
-            "stress": laws.extra_stress(self.F, m) / self.J - self.pore_pressure * Id(self.kinematics.dimension),
-        }
-
-
-OUTPUT_UNITS = {
-    "displacement": "mm",
-    "J": "-",
-    "p": "N/mm²",
-    "hydraulic_pressure": "N/mm²",
-    "c_plus": "mol/l",
-    "c_minus": "mol/l",
-    "cfc": "mol/l",
-    "nS": "-",
-    "seepage": "mm/s",
-    "cation_flux": "mol/l mm/s",
-    "stress": "N/mm²",
-}
+    def bounds(self, state: State) -> dict[str, CoefficientFunction]:
+        return {"fluid content J − nS0": state.content, "cation concentration": state.c}

@@ -1,11 +1,18 @@
-"""A residual as named terms."""
+"""A residual as named terms, and what a model offers."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, ClassVar, Literal, Protocol
 
-from ngsolve import CoefficientFunction
+from ngsolve import CoefficientFunction, FESpace, Mesh
+
+from ngswell.baths import BathFields, Treatment
+from ngswell.errors import InputError
+from ngswell.kinematics import Kinematics
+from ngswell.materials import Field, Material
+from ngswell.supports import Weight
 
 
 @dataclass(frozen=True)
@@ -24,3 +31,70 @@ class Term:
 
     def __str__(self) -> str:
         return f"{self.balance}: {self.name}" + (f" [{self.boundary}]" if self.boundary else "")
+
+
+class Model(Protocol):
+    """A set of unknowns, the first the displacement: spaces, residual, boundary conditions, outputs."""
+
+    @property
+    def order(self) -> int: ...
+
+    unknowns: ClassVar[tuple[str, ...]]
+    balances: ClassVar[tuple[str, ...]]
+    held: ClassVar[dict[str, str]]
+    """The unknown whose test functions balance what the body holds: {"fluid": "p", ...}."""
+    evolving: ClassVar[dict[str, float]]
+    """Fields whose time error is controlled, with the fraction of their reference size that the error is relative to
+    as long as they have changed by less."""
+    treatments: ClassVar[tuple[type, ...]]
+    """Treatments of a bath that the model knows, its default first."""
+
+    def default_treatment(self) -> Treatment: ...
+
+    def check(self, material: Material, baths: Sequence[Any]) -> None:
+        """Refuse materials and baths that the model cannot mean."""
+        ...
+
+    def space(self, mesh: Mesh, kinematics: Kinematics, held: dict[str, str], essential: str) -> FESpace:
+        """Product space. `held` maps a direction to boundaries where u vanishes; on `essential` baths prescribe values."""
+        ...
+
+    def state(
+        self,
+        functions: Sequence[CoefficientFunction],
+        material: Material,
+        kinematics: Kinematics,
+        charge: Field,
+        weight: Weight | None,
+        bath: BathFields | None,
+    ) -> Any:
+        """The fields that `functions` (trial functions or components of a result, one an unknown) stand for."""
+        ...
+
+    def equilibrium(self, bath: BathFields, cfc: CoefficientFunction, material: Material) -> dict[str, CoefficientFunction]:
+        """Values of unknowns that equilibrium with a bath gives, for initial states and prescribed values."""
+        ...
+
+    def terms(self, state: Any, tests: Sequence[CoefficientFunction]) -> list[Term]:
+        """The balances over the body, pulled back to the reference configuration."""
+        ...
+
+    def weak_terms(
+        self, state: Any, tests: Sequence[CoefficientFunction], bath: BathFields, factors: tuple[Field, Field]
+    ) -> dict[str, CoefficientFunction]:
+        """Weakly imposed equilibrium: efflux per current area, tested, by balance; `factors` for p and for c."""
+        ...
+
+    def references(self, concentration: float, stress: float, length: float) -> dict[str, float]:
+        """Natural size of each unknown from the scene's largest concentration, shear modulus and length."""
+        ...
+
+    def bounds(self, state: Any) -> dict[str, CoefficientFunction]:
+        """Fields that have to stay positive, by name."""
+        ...
+
+
+def check_order(model: str, order: int) -> None:
+    """Refuse orders that are not implemented."""
+    if order not in (2, 3, 4, 5, 6):
+        raise InputError(f"{model}(order={order!r}): order 2 to 6 for u, the other unknowns get one less")

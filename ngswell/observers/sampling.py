@@ -24,7 +24,7 @@ class Probe(Observer):
     """Quantities at a point of the reference configuration [mm].
 
     `Probe((1.1, 0.5), "J", "p")`; then `probe.times` and `probe.values["J"]` are arrays, one row a record. Quantities and
-    units are those of `ngswell.models.concentration.OUTPUT_UNITS`.
+    units are those of `ngswell.models.OUTPUT_UNITS`.
     """
 
     def __init__(self, point: Sequence[float], *quantities: str, when: float | Sequence[float] | None = None) -> None:
@@ -75,13 +75,15 @@ class Integral(Observer):
     def start(self, problem: Problem, begin: float, until: float) -> None:
         quantity = CF(1.0) if self.quantity is None else _output(problem, self.quantity)
         if self.boundary is None:
-            self._density = (quantity * problem.state.J).Compile()
+            self._density = (quantity * problem.state.J * problem.kinematics.weight).Compile()
             self._region = {"mesh": problem.mesh}
         else:
             problem.scene.check_boundary("Integral", self.boundary)
             cofactor = BoundaryFromVolumeCF(problem.state.cofactor)
-            stretch = Norm(cofactor * specialcf.normal(problem.mesh.dim)) if problem.mesh.dim > 1 else CF(1.0)
-            self._density = BoundaryFromVolumeCF(quantity) * stretch
+            components = specialcf.normal(problem.mesh.dim)
+            normal = problem.kinematics.flow_vector(tuple(components[i] for i in range(problem.mesh.dim)))
+            stretch = Norm(cofactor * normal) if problem.mesh.dim > 1 else CF(1.0)
+            self._density = BoundaryFromVolumeCF(quantity) * stretch * problem.kinematics.weight
             self._region = {"mesh": problem.mesh, "VOL_or_BND": BND, "definedon": problem.mesh.Boundaries(self.boundary)}
         super().start(problem, begin, until)
 
@@ -101,7 +103,7 @@ class Integral(Observer):
 
 
 class Area(Integral):
-    """Area of the deformed body in plane strain [mm²]; its length in confined motion [mm]."""
+    """Area of the deformed body in plane strain [mm²], its volume in three dimensions [mm³], its length confined [mm]."""
 
     def __init__(self, when: float | Sequence[float] | None = None) -> None:
         super().__init__(when=when)

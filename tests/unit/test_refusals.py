@@ -14,11 +14,14 @@ from ngswell import (
     Blend,
     Concentration,
     Confined,
+    Essential,
     Fixed,
     Frozen,
     InputError,
     Integral,
+    Lagged,
     Ledger,
+    LocalDonnan,
     Material,
     OutputError,
     Penalty,
@@ -31,6 +34,7 @@ from ngswell import (
     Snapshots,
     Symmetry,
     Traction,
+    Uncharged,
     Weight,
     column,
     rectangle,
@@ -39,6 +43,9 @@ from ngswell.analytic import homogeneous_equilibrium
 from ngswell.stability import growth_factor
 
 GOOD = {"mu": 0.24, "lam": 0.02, "nS0": 0.25, "cfc0": 0.2, "D_plus": 5e-4, "D_minus": 8e-4, "K": 1e-3}
+
+
+UNCHARGED = Material(**{**GOOD, "cfc0": 0.0})
 
 
 @pytest.mark.parametrize(
@@ -81,6 +88,13 @@ def test_material_field_out_of_range_is_found_on_the_mesh():
         ({"baths": []}, "initial="),
         ({"baths": [Bath("top", c=0.15), Bath("bottom", c=0.2)]}, "differ at the start"),
         ({"charge": Ramp((0, -1.0))}, "charge factor"),
+        ({"baths": [Bath("top", P=0.1)]}, "Concentration needs its salt concentration"),
+        ({"baths": [Bath("top", c=0.15, treatment=Essential())]}, "it has Penalty, Lagged, Frozen"),
+        ({"model": Uncharged()}, "cfc0 other than 0"),
+        ({"model": Uncharged(), "material": UNCHARGED}, "takes no concentration"),
+        ({"model": LocalDonnan(), "baths": []}, "needs a bath"),
+        ({"model": LocalDonnan(), "baths": [Bath("top", c=0.1), Bath("bottom", c=0.2)]}, "differ in concentration"),
+        ({"model": LocalDonnan(), "baths": [Bath("top", c=0.1, treatment=Lagged())]}, "it has Essential, Penalty"),
     ],
 )
 def test_scene(change, words):

@@ -71,9 +71,9 @@ def test_a_soft_lagged_column_grows():
 class PrintedPenalty(Penalty):
     """The third terms of (27) and (32) on the side on which they are printed."""
 
-    def efflux(self, site):
-        fluid, cations = super().efflux(site)
-        return -fluid, -cations
+    def factors(self, material, h):
+        for_p, for_c = super().factors(material, h)
+        return -for_p, -for_c
 
 
 def test_the_printed_sign_fails():

@@ -1,0 +1,128 @@
+"""Ions everywhere in equilibrium with one bath (the Lanir assumption): displacement and one pressure."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import ClassVar
+
+from ngsolve import H1, CoefficientFunction, FESpace, InnerProduct, Mesh
+
+from ngswell import donnan
+from ngswell.baths import Bath, BathFields, Essential, Penalty
+from ngswell.errors import InputError
+from ngswell.kinematics import Kinematics
+from ngswell.materials import Field, Material
+from ngswell.models.mechanics import SolidState
+from ngswell.models.terms import Term, check_order
+from ngswell.supports import Weight
+
+
+@dataclass(frozen=True)
+class State(SolidState):
+    """Displacement and hydraulic pressure P; the ions follow from the charge at the point and the bath."""
+
+    bath: BathFields
+    P: CoefficientFunction
+
+    @cached_property
+    def pore_pressure(self) -> CoefficientFunction:
+        """Overall pressure p = P + 2 Rθ [sqrt(c̄² + cfc²/4) − c̄], eq. (38) [N/mm²]."""
+        return donnan.pressure(self.bath.c, self.pointwise_charge, self.material.RT, self.P)
+
+    @cached_property
+    def cations(self) -> CoefficientFunction:
+        """c₊ of (23)₁ [mol/l]."""
+        return donnan.cations(self.bath.c, self.pointwise_charge)
+
+    def seepage(self, frame: CoefficientFunction) -> CoefficientFunction:
+        """nF wF = −K grad P / (1 + K Rθ cfc² / [nF (D₊ c₊ + D₋ c₋)]) in the `frame` (`pull` or `push`) [mm/s].
+
+        Fluid that drags its charge along builds up a streaming potential; zero current (21) with uniform salt makes it
+        a smaller permeability.
+        """
+        m, cfc = self.material, self.pointwise_charge
+        conductance = m.D_plus * self.cations + m.D_minus * donnan.anions(self.bath.c, cfc)
+        drag = m.K * m.RT * cfc * cfc / (self.nF * conductance)
+        return -m.K / (1 + drag) * (frame * self.drive(self.P))
+
+    def outputs(self) -> dict[str, CoefficientFunction]:
+        """Named fields in the current configuration; `ngswell.models.OUTPUT_UNITS` has their units."""
+        cfc = self.pointwise_charge
+        return {
+            **self.solid_outputs(self.pore_pressure),
+            "p": self.pore_pressure,
+            "hydraulic_pressure": self.P - 2 * self.material.RT * self.bath.c,
+            "c_plus": self.cations,
+            "c_minus": donnan.anions(self.bath.c, cfc),
+            "cfc": cfc,
+            "seepage": self.seepage(self.push),
+        }
+
+
+@dataclass(frozen=True)
+class LocalDonnan:
+    """Unknowns u (order k) and hydraulic pressure P (order k − 1); the limit of fast ion diffusion in the full model."""
+
+    order: int = 2
+
+    unknowns: ClassVar[tuple[str, ...]] = ("u", "P")
+    balances: ClassVar[tuple[str, ...]] = ("momentum", "fluid")
+    held: ClassVar[dict[str, str]] = {"fluid": "P"}
+    evolving: ClassVar[dict[str, float]] = {"u": 1e-2, "P": 1e-1}
+    treatments: ClassVar[tuple[type, ...]] = (Essential, Penalty)
+
+    def __post_init__(self) -> None:
+        check_order("LocalDonnan", self.order)
+
+    def default_treatment(self) -> Essential:
+        return Essential()
+
+    def check(self, material: Material, baths: Sequence[Bath]) -> None:
+        if not baths or any(bath.c is None for bath in baths):
+            raise InputError("LocalDonnan needs a bath with its salt concentration c [mol/l]")
+        for bath in baths[1:]:
+            if bath.concentration != baths[0].concentration:
+                raise InputError(
+                    f"baths on {baths[0].boundary!r} and {bath.boundary!r} differ in concentration: "
+                    "LocalDonnan has the ions in equilibrium with one bath; use Concentration"
+                )
+
+    def space(self, mesh: Mesh, kinematics: Kinematics, held: dict[str, str], essential: str) -> FESpace:
+        V = kinematics.space(mesh, self.order, held)
+        return FESpace([V, H1(mesh, order=self.order - 1, dirichlet=essential)])
+
+    def state(
+        self,
+        functions: Sequence[CoefficientFunction],
+        material: Material,
+        kinematics: Kinematics,
+        charge: Field,
+        weight: Weight | None,
+        bath: BathFields | None,
+    ) -> State:
+        return State(material, kinematics, charge, weight, functions[0], bath, functions[1])  # type: ignore[arg-type]
+
+    def equilibrium(self, bath: BathFields, cfc: CoefficientFunction, material: Material) -> dict[str, CoefficientFunction]:
+        return {"P": bath.P}
+
+    def terms(self, state: State, tests: Sequence[CoefficientFunction]) -> list[Term]:
+        v, q = tests
+        flux = state.seepage(state.pull)
+        return [
+            *state.momentum(state.pore_pressure, v),
+            Term("fluid", "storage", state.content * q, "rate"),
+            Term("fluid", "seepage", -InnerProduct(flux, state.kinematics.flow_gradient(q))),
+        ]
+
+    def weak_terms(
+        self, state: State, tests: Sequence[CoefficientFunction], bath: BathFields, factors: tuple[Field, Field]
+    ) -> dict[str, CoefficientFunction]:
+        return {"fluid": factors[0] * (state.P - bath.P) * tests[1]}
+
+    def references(self, concentration: float, stress: float, length: float) -> dict[str, float]:
+        return {"u": length, "P": stress}
+
+    def bounds(self, state: State) -> dict[str, CoefficientFunction]:
+        return {"fluid content J − nS0": state.content}
