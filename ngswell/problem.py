@@ -94,14 +94,14 @@ class Problem:
         self.free = self._free_dofs()
 
         self.dt = Parameter(1.0)
-        self._charge = scene.charge.signal()
+        self._charge = Parameter(scene.charge.at(scene.start))
 
         trials, tests = (list(functions) for functions in self.space.TnT())
         weight = next((load for load in scene.loads if isinstance(load, Weight)), None)
         bath = self._baths[0].fields if self._baths else None
 
         def state(functions: Any) -> Any:
-            return self.model.state(functions, material, self.kinematics, self._charge.field, weight, bath)
+            return self.model.state(functions, material, self.kinematics, self._charge, weight, bath)
 
         self.terms = self.model.terms(state(trials), tests) + self._boundary_terms(state(trials), tests)
         self.state = state(self.fields.components)
@@ -169,18 +169,18 @@ class Problem:
     def _component(self, name: str) -> GridFunction:
         return self.fields.components[self.names.index(name)]
 
-    def set_time(self, time: float) -> None:
-        """Move every schedule to `time` [s]."""
-        self._charge.set(time)
+    def set_time(self, time: float, charge_share: float = 1.0) -> None:
+        """Move every schedule to `time` [s]; `charge_share` of the charge, for continuation."""
+        self._charge.Set(charge_share * self.scene.charge.at(time))
         for entry in self._baths:
             entry.set(time)
 
-    def initialise(self) -> None:
+    def initialise(self, charge_share: float = 1.0) -> None:
         """The reference configuration in Donnan equilibrium with the initial bath, at the scene's start."""
-        self.set_time(self.scene.start)
+        self.set_time(self.scene.start, charge_share)
         concentration, hydraulic = self.scene.initial_bath()
         bath = BathFields(None if concentration is None else CF(concentration), CF(hydraulic))
-        cfc = self._charge.field * self.scene.material.cfc0
+        cfc = self._charge * self.scene.material.cfc0
         self.fields.vec[:] = 0.0
         for name, value in self.model.equilibrium(bath, cfc, self.scene.material).items():
             self._component(name).Set(value)
@@ -202,13 +202,13 @@ class Problem:
         """All coefficients, as a numpy view."""
         return self.fields.vec.FV().NumPy()
 
-    def begin_step(self, time: float, dt: float, guess: NDArray | None = None) -> None:
+    def begin_step(self, time: float, dt: float, guess: NDArray | None = None, charge_share: float = 1.0) -> None:
         """Prepare the step that ends at `time`: history, parameters, prescribed values; `guess` as first iterate."""
         self._contents.Apply(self.fields.vec, self._old_contents)
         self.dt.Set(dt)
         if "cfc" in self.names:
             self._charges["last"].vec.data = self._component("cfc").vec
-        self.set_time(time)
+        self.set_time(time, charge_share)
         values = self._prescribed_values()
         if guess is not None:
             self.vector[:] = guess

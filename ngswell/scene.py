@@ -14,6 +14,7 @@ from ngsolve import CoefficientFunction, FESpace, Mesh, TaskManager, specialcf
 from threadpoolctl import threadpool_limits
 
 from ngswell.baths import Bath, Treatment
+from ngswell.equilibrium import equilibrate
 from ngswell.errors import InputError
 from ngswell.kinematics import Kinematics
 from ngswell.materials import Material
@@ -257,6 +258,10 @@ class Scene:
         return "\n".join(lines)
 
     # -- running -------------------------------------------------------------------------------------------------------
+
+    def equilibrate(self, time: float | None = None) -> Snapshot:
+        """The state of rest for the charge and baths at `time` [s] (the start), without a transient; see `equilibrate`."""
+        return equilibrate(self, time)
 
     def run(
         self,

@@ -1,0 +1,73 @@
+"""The state of rest, without the transient that leads to it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from numpy.typing import NDArray
+
+from ngswell.baths import Essential, Penalty
+from ngswell.errors import InputError, StepError
+from ngswell.newton import Newton, Outcome
+from ngswell.problem import Snapshot
+from ngswell.solvers import LinearSolver
+
+if TYPE_CHECKING:
+    from ngswell.scene import Scene
+
+SMALLEST_SHARE = 1e-4
+"""Continuation gives up below this share of the charge."""
+
+STATIONARY = 1e30
+"""A time step [s] beyond which contents do not change any more."""
+
+
+def equilibrate(scene: Scene, time: float | None = None, newton: Newton | None = None) -> Snapshot:
+    """The state in which the scene comes to rest when its charge and baths stay as they are at `time` [s] (its start).
+
+    The stationary balances are solved by continuation: from the uncharged body, already loaded, the charge is raised as
+    fast as Newton's method follows. Works for fields of position and constrained bodies. Raises InputError for a
+    sealed body (what it holds is not determined by balances) and for treatments that remember the past, and StepError when
+    no more of the charge can be added.
+    """
+    time = scene.start if time is None else time
+    if not scene.baths:
+        raise InputError("equilibrate: the body is sealed, so its content at rest is not determined; give it a bath")
+    for bath in scene.baths:
+        if not isinstance(scene.treatment(bath), (Penalty, Essential)):
+            raise InputError(f"equilibrate: the bath on {bath.boundary!r} remembers the past ({scene.treatment(bath)})")
+    problem, method = scene.problem, newton or Newton()
+    problem.initialise(charge_share=0.0)
+    solver = LinearSolver(problem.free)
+
+    def solve(share: float, guess: NDArray) -> Outcome:
+        problem.begin_step(time, STATIONARY, guess, charge_share=share)
+        return method.solve(problem, solver)
+
+    def give_up(share: float, outcome: Outcome) -> StepError:
+        reason = f"at {share:.3g} of the charge, {outcome.reason}"
+        remedy = "Remedies: a smaller load, a finer mesh where the field is worst."
+        return StepError(time, STATIONARY, outcome.field, outcome.where, reason, remedy)
+
+    outcome = solve(0.0, problem.vector.copy())
+    if outcome.reason is not None:
+        raise give_up(0.0, outcome)
+    step, reached = 1.0, [(0.0, problem.vector.copy())]
+    while reached[-1][0] < 1.0:
+        share, state = reached[-1]
+        target = min(1.0, share + step)
+        guess = state
+        if len(reached) > 1:
+            earlier, old = reached[-2]
+            guess = state + (target - share) / (share - earlier) * (state - old)
+        outcome = solve(target, guess)
+        if outcome.reason is None:
+            reached = [(share, state), (target, problem.vector.copy())]
+            step *= 2
+            continue
+        problem.vector[:] = state
+        step /= 4
+        if step < SMALLEST_SHARE:
+            raise give_up(share, outcome)
+    problem.set_time(time)
+    return problem.snapshot(time)
