@@ -1,0 +1,102 @@
+"""The state of rest reached directly, against closed forms and against the ramped transient."""
+
+import numpy as np
+import pytest
+from conftest import P0, strip
+from ngsolve import x, y
+
+from ngswell import (
+    TABLE_2,
+    Adaptive,
+    Area,
+    Bath,
+    Fixed,
+    InputError,
+    Lagged,
+    LocalDonnan,
+    Material,
+    Penalty,
+    PlaneStrain,
+    Ramp,
+    Roller,
+    Scene,
+    StepError,
+    Symmetry,
+    Traction,
+    rectangle,
+)
+from ngswell.analytic import homogeneous_equilibrium
+
+
+def block(model=None, material=TABLE_2, supports=None, **changes):
+    return Scene(
+        **{
+            "mesh": rectangle(1.0, 1.0, 4, 4),
+            "kinematics": PlaneStrain(),
+            "material": material,
+            "supports": supports or [Symmetry("left"), Symmetry("bottom")],
+            "baths": [Bath("top|right", c=Ramp((500, 4.1), (600, 0.3)))],
+            "charge": Ramp((0, 0.0), (400, 1.0)),
+            **({} if model is None else {"model": model}),
+            **changes,
+        }
+    )
+
+
+@pytest.mark.parametrize("model", [None, LocalDonnan()])
+@pytest.mark.parametrize(("time", "bath"), [(500.0, 4.1), (600.0, 0.3)])
+def test_homogeneous_block(model, time, bath):
+    scene = block(model)
+    scene.problem.restore(scene.equilibrate(time))
+    J = scene.problem.state.J(scene.problem._quadrature).ravel()
+    # Newton's tolerance 1e-8 of the unknowns' sizes, and one quadratic step beyond.
+    assert pytest.approx(np.full_like(J, homogeneous_equilibrium(TABLE_2, bath, "plane strain").J), rel=1e-9) == J
+
+
+LAYERED = Material(
+    mu=0.12 * (1 + y), lam=0.02, nS0=0.2 + 0.1 * x, cfc0=0.4 + 0.3 * x * y, D_plus=5e-4, D_minus=8e-4, K=1.07e-3
+)
+
+
+@pytest.mark.parametrize("supports", [None, [Roller("bottom", "xy"), Symmetry("left")]])
+def test_agrees_with_the_transient(supports):
+    """Fields of position, free and clamped: the transient ends in the same state, at many times the iterations."""
+    scene = block(material=LAYERED, supports=supports)
+    direct = scene.equilibrate(600.0)
+    end = scene.run(1e7, Adaptive(2e-2)).end
+    for name, part in scene.problem.ranges.items():
+        size = scene.problem.references[name]
+        assert end.values[part] == pytest.approx(direct.values[part], abs=1e-7 * size), name
+
+
+def test_a_run_stays_in_it():
+    scene = block(material=LAYERED, baths=[Bath("top|right", c=1.0)])
+    area = Area()
+    scene.run(1500.0, Fixed(100.0), [area], resume=scene.equilibrate(1000.0))
+    assert area.values == pytest.approx(np.full_like(area.values, area.values[0]), rel=1e-10)
+
+
+def test_a_loaded_strip_stays_in_its_reference_state():
+    scene = strip()
+    snapshot = scene.equilibrate()
+    u = snapshot.values[scene.problem.ranges["u"]]
+    assert np.abs(u).max() < 1e-10
+    assert snapshot.values[scene.problem.ranges["p"]] == pytest.approx(P0, rel=1e-9)
+
+
+def test_refusals():
+    with pytest.raises(InputError, match="sealed"):
+        block(baths=[], initial=(1.0, 0.0)).equilibrate()
+    with pytest.raises(InputError, match="remembers the past"):
+        strip(Lagged()).equilibrate()
+    with pytest.raises(StepError, match="of the charge"):
+        strip(loads=[Traction("top", (0.0, -900.0))]).equilibrate()
+
+
+def test_penalty_does_not_matter_at_rest():
+    # No flux, no bias: ε over ten decades gives one state.
+    areas = []
+    for relative in (1e-3, 1e7):
+        scene = block(material=LAYERED, baths=[Bath("top|right", c=1.0, treatment=Penalty(relative=relative))])
+        areas.append(scene.equilibrate(1000.0).values[scene.problem.ranges["u"]])
+    assert areas[0] == pytest.approx(areas[1], abs=2e-3)
