@@ -12,19 +12,20 @@ from ngswell import NgswellError
 from ngswell.plotting import use_style
 from studies.output import prepare, write
 
-STUDIES = ("boundary_charge", "oscillation", "free_swelling")
+PAPER = ("boundary_charge", "oscillation", "free_swelling")
+STUDIES = (*PAPER, "cylinder")
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run the named study, or all; returns the exit status."""
-    parser = argparse.ArgumentParser(prog="python -m studies", description="Draw the paper's figures, with their numbers.")
-    parser.add_argument("name", nargs="?", choices=STUDIES, help="one study; all if none is named")
+    """Run the named study, or those of the paper; returns the exit status."""
+    parser = argparse.ArgumentParser(prog="python -m studies", description="Draw figures, with their numbers.")
+    parser.add_argument("name", nargs="?", choices=STUDIES, help="one study; the paper's three if none is named")
     parser.add_argument("--quick", action="store_true", help="coarser and shorter, within about a minute")
     parser.add_argument("--out", type=Path, help="folder to write to; figures/ by default, figures/quick/ with --quick")
     parser.add_argument("--overwrite", action="store_true", help="replace files in the folder named with --out")
     options = parser.parse_args(arguments)
 
-    names = STUDIES if options.name is None else (options.name,)
+    names = PAPER if options.name is None else (options.name,)
     own = Path("figures/quick") if options.quick else Path("figures")
     folder = own if options.out is None else options.out
     try:

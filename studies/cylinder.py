@@ -1,0 +1,221 @@
+"""The experiment behind Figs. 9 and 10 was a cylinder: the free-swelling loading on a disc and on a block in space.
+
+A disc of radius 1.1 mm and height 1.0 mm (axisymmetric) takes the place of the plane block: outside and top go to 0.3 mol/l
+at once, the bottom later. An eighth of a block of 2.2 × 2.2 × 1.0 mm³ (3-d) has the quick dilution on all its faces. Both
+start at rest in 4.1 mol/l, reached by continuation in the charge. Numbers:
+
+- `disc_initial_J`, `block_initial_J`, `closed_form_initial_J`: volume ratio to the reference at 7000 s;
+- `disc_volume_ratio_11000`, `block_volume_ratio_11000`: volume relative to 7000 s;
+- `disc_volume_ratio_equilibrium`, `block_volume_ratio_equilibrium`: at rest, from a transient run on to 1e6 s, and
+  `closed_form_volume_ratio_equilibrium`; `disc_equilibrate_error`: the same reached directly, relative difference;
+- `disc_core_J_min`, `disc_core_J_min_time_s`: smallest J on the axis at mid-height (negative osmosis), `block_core_J_min`;
+- `disc_arch_max_mm`, `disc_arch_max_time_s`: rise of the bottom's centre above its rim;
+- `disc_fluid_imbalance`, `block_fluid_imbalance`: closure of the ledgers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.cm import ScalarMappable
+from matplotlib.collections import LineCollection
+from matplotlib.colors import BoundaryNorm
+from matplotlib.figure import Figure
+from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+from ngsolve import CF, ET, IfPos, IntegrationRule, x, y, z
+from numpy.typing import NDArray
+
+from ngswell import (
+    TABLE_2,
+    Adaptive,
+    Area,
+    Axisymmetric,
+    Bath,
+    Blend,
+    Ledger,
+    Penalty,
+    Pin,
+    Probe,
+    Progress,
+    Result,
+    Scene,
+    Snapshots,
+    Solid,
+    Symmetry,
+    box,
+    rectangle,
+)
+from ngswell.analytic import homogeneous_equilibrium
+from ngswell.plotting import on_deformed_body
+from studies.free_swelling import BOTTOM, END, INITIAL, SIDE
+from studies.output import Findings, cost
+
+RADIUS, HEIGHT = 1.1, 1.0  # mm
+AT_REST = 1e6  # s
+PICTURES = (7000.0, 7224.0, 7650.0, 11000.0)  # s
+LEVELS = np.linspace(-0.04, 0.16, 11)  # N/mm²
+
+
+def disc(n: int) -> Scene:
+    """The disc in the (r, z) half-plane; its baths blend over 0.3 mm at the bottom's rim."""
+    from_rim = RADIUS - x
+    outside = Blend(SIDE, BOTTOM, 0.5 * IfPos(0.3 - y, (0.3 - y) / 0.3, 0.0))
+    below = Blend(BOTTOM, SIDE, 0.5 * IfPos(0.3 - from_rim, (0.3 - from_rim) / 0.3, 0.0))
+    weak = Penalty(40.0)
+    return Scene(
+        mesh=rectangle(RADIUS, HEIGHT, n, n),
+        kinematics=Axisymmetric(),
+        material=TABLE_2,
+        supports=[Symmetry("left"), Pin((RADIUS, 0.0), "z")],
+        baths=[
+            Bath("top", c=SIDE, treatment=weak),
+            Bath("right", c=outside, treatment=weak),
+            Bath("bottom", c=below, treatment=weak),
+        ],
+        start=INITIAL,
+    )
+
+
+def block(n: int) -> Scene:
+    """An eighth of the block between its symmetry planes."""
+    return Scene(
+        mesh=box(RADIUS, RADIUS, HEIGHT / 2, n, n, n),
+        kinematics=Solid(),
+        material=TABLE_2,
+        supports=[Symmetry("left"), Symmetry("front"), Symmetry("bottom")],
+        baths=[Bath("right|back|top", c=SIDE, treatment=Penalty(40.0))],
+        start=INITIAL,
+    )
+
+
+@dataclass(frozen=True)
+class Course:
+    """A run of a body with what was watched, and its volume at rest."""
+
+    scene: Scene
+    result: Result
+    rest: Result
+    volume: Area
+    resting: Area
+    core: Probe
+    rim: Probe | None
+    ledger: Ledger
+    pictures: Snapshots
+
+    def ratio(self, time: float) -> float:
+        """Volume at `time` [s] over the volume at 7000 s."""
+        return float(np.interp(time, self.volume.time, self.volume.values) / self.volume.values[0])
+
+    def numbers(self, name: str, reference_volume: float) -> dict[str, float | int | str]:
+        """The numbers that both bodies have."""
+        J = self.core.values["J"]
+        return {
+            f"{name}_initial_J": float(self.volume.values[0]) / reference_volume,
+            f"{name}_volume_ratio_11000": self.ratio(END),
+            f"{name}_volume_ratio_equilibrium": float(self.resting.values[-1] / self.volume.values[0]),
+            f"{name}_core_J_min": float(J.min()),
+            f"{name}_core_J_min_time_s": float(self.core.time[np.argmin(J)]),
+            f"{name}_fluid_imbalance": self.ledger.imbalance()["fluid"],
+        }
+
+
+def course(
+    label: str, body: Scene, core: Sequence[float], rim: Sequence[float] | None, tolerance: float, pictures: Sequence[float]
+) -> Course:
+    """From the swollen state at 7000 s to 11000 s, and on to rest."""
+    volume, resting, ledger, snapshots = Area(), Area(), Ledger(), Snapshots(pictures)
+    at_core = Probe(core, "J")
+    at_rim = None if rim is None else Probe(rim, "displacement")
+    swollen = body.equilibrate(INITIAL)
+    observers = [volume, at_core, ledger, snapshots, Progress(f"cylinder {label}")] + ([at_rim] if at_rim else [])
+    result = body.run(END, Adaptive(tolerance), observers, resume=swollen)
+    rest = body.run(AT_REST, Adaptive(tolerance), [resting, Progress(f"cylinder {label} to rest")], resume=result.end)
+    return Course(body, result, rest, volume, resting, at_core, at_rim, ledger, snapshots)
+
+
+def run(quick: bool = False) -> Findings:
+    """Both bodies."""
+    n_disc, n_block, tolerance = (10, 2, 1e-2) if quick else (20, 4, 2e-3)
+    cylinder = course("disc", disc(n_disc), (0.0, HEIGHT / 2), (0.0, 0.0), tolerance, PICTURES)
+    cuboid = course("block", block(n_block), (0.0, 0.0, 0.0), None, tolerance, PICTURES[1:])
+
+    swollen, final = (homogeneous_equilibrium(TABLE_2, c, "3-d") for c in (SIDE.values[0], SIDE.values[-1]))
+    numbers = cylinder.numbers("disc", np.pi * RADIUS**2 * HEIGHT) | cuboid.numbers("block", RADIUS**2 * HEIGHT / 2)
+    assert cylinder.rim is not None
+    arch = cylinder.rim.values["displacement"][:, 1]
+    problem = cylinder.scene.problem
+    problem.restore(cylinder.scene.equilibrate(END))
+    J = problem.state.J(problem.mesh(RADIUS / 2, HEIGHT / 2))
+    numbers |= {
+        "closed_form_initial_J": swollen.J,
+        "closed_form_volume_ratio_equilibrium": final.J / swollen.J,
+        "disc_equilibrate_error": abs(J / final.J - 1),
+        "disc_arch_max_mm": float(arch.max()),
+        "disc_arch_max_time_s": float(cylinder.rim.time[np.argmax(arch)]),
+        "mesh": f"disc {n_disc} x {n_disc} quadrilaterals, block {n_block}^3 hexahedra, order 2",
+        "tolerance": tolerance,
+    }
+    numbers |= cost([cylinder.result, cylinder.rest, cuboid.result, cuboid.rest])
+    rows = [
+        (name, float(t), float(v / c.volume.values[0]), float(J))
+        for name, c in (("disc", cylinder), ("block", cuboid))
+        for t, v, J in zip(c.volume.time, c.volume.values, c.core.values["J"], strict=True)
+    ]
+    return Findings(draw(cylinder, cuboid), ("body", "time_s", "volume_ratio", "core_J"), rows, numbers)
+
+
+def draw(cylinder: Course, cuboid: Course) -> Figure:
+    """Sections of the disc above, the eighth of the block seen from its symmetry planes below."""
+    figure = plt.figure(figsize=(10.0, 5.4))
+    grid = figure.add_gridspec(2, 4, height_ratios=(1, 1.2))
+    norm = BoundaryNorm(LEVELS, 256, extend="both")
+    for column, state in enumerate(cylinder.pictures.states):
+        ax = figure.add_subplot(grid[0, column])
+        cylinder.scene.problem.restore(state)
+        half = on_deformed_body(cylinder.scene.problem, cylinder.scene.problem.state.p)
+        for part in (half, half.mirrored(0.0)):
+            ax.tricontourf(part.mesh, part.values, levels=LEVELS, norm=norm, extend="both")
+            ax.add_collection(LineCollection(list(part.outlines), colors="k", linewidths=0.12))
+        ax.set(title=f"{state.time:g} s", aspect="equal", xlim=(-1.75, 1.75), ylim=(-0.35, 1.75), xlabel="r [mm]")
+        ax.grid(False)
+        if column == 0:
+            ax.set_ylabel("z [mm]")
+    for column, state in enumerate(cuboid.pictures.states):
+        ax = figure.add_subplot(grid[1, column], projection="3d")
+        cuboid.scene.problem.restore(state)
+        faces, values = surface(cuboid.scene)
+        colours = plt.get_cmap()(norm(values) / 256)
+        ax.add_collection3d(Poly3DCollection(faces, facecolors=colours, edgecolors=(0, 0, 0, 0.25), linewidths=0.15))
+        ax.set(xlim=(0, 1.6), ylim=(0, 1.6), zlim=(0, 0.8))
+        ax.set_box_aspect((1.6, 1.6, 0.8), zoom=1.1)
+        ax.set_title(f"{state.time:g} s")
+        ax.view_init(elev=24, azim=235)
+        ax.set_axis_off()
+        ax.plot((0, 0.5), (-0.15, -0.15), (0, 0), "k-", lw=1.5)  # the scale
+        ax.text(0.3, -0.42, 0.0, "0.5 mm", fontsize=7, ha="center")
+    volume = figure.add_subplot(grid[1, 3])
+    for name, c, style in (("disc", cylinder, "-"), ("block", cuboid, "--")):
+        volume.plot(c.volume.time / 1000, c.volume.values / c.volume.values[0], "k" + style, label=name)
+    volume.set(xlabel="time [1000 s]", ylabel="volume / volume at 7000 s")
+    volume.legend()
+    label = "overall pressure p [N/mm²]"
+    figure.colorbar(ScalarMappable(norm), ax=figure.axes[:7], label=label, location="bottom", shrink=0.5, aspect=40)
+    return figure
+
+
+def surface(body: Scene, cuts: int = 3) -> tuple[NDArray, NDArray]:
+    """Pieces of the deformed surface (n, 4, 3) [mm] of a body of hexahedra and the mean of p on each [N/mm²]."""
+    problem = body.problem
+    side = np.linspace(0.0, 1.0, cuts + 1)
+    local = [(a, b) for b in side for a in side]
+    rule = IntegrationRule(local, [0.0] * len(local))
+    where = problem.mesh.MapToAllElements({ET.QUAD: rule}, problem.mesh.Boundaries(".*"))
+    n = cuts + 1
+    corner = np.array([row * n + column for row in range(cuts) for column in range(cuts)])
+    pieces = np.stack([corner, corner + 1, corner + n + 1, corner + n], 1)
+    position = (CF((x, y, z)) + problem.state.u)(where).reshape(-1, n * n, 3)
+    pressure = problem.state.p(where).reshape(-1, n * n)
+    return position[:, pieces].reshape(-1, 4, 3), pressure[:, pieces].mean(axis=2).ravel()
