@@ -1,4 +1,4 @@
-"""Command line of the studies: `python -m studies [NAME] [--quick] [--out DIR] [--overwrite]`."""
+"""Command line of the studies: `python -m studies [NAME] [--quick] [--out DIR] [--overwrite] [--from-rest]`."""
 
 from __future__ import annotations
 
@@ -23,9 +23,13 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--quick", action="store_true", help="coarser and shorter, within about a minute")
     parser.add_argument("--out", type=Path, help="folder to write to; figures/ by default, figures/quick/ with --quick")
     parser.add_argument("--overwrite", action="store_true", help="replace files in the folder named with --out")
+    parser.add_argument("--from-rest", action="store_true", help="free_swelling: skip the ramp of the charge")
     options = parser.parse_args(arguments)
+    if options.from_rest and options.name != "free_swelling":
+        parser.error("--from-rest goes with free_swelling")
 
     names = PAPER if options.name is None else (options.name,)
+    special = {"from_rest": True} if options.from_rest else {}
     own = Path("figures/quick") if options.quick else Path("figures")
     folder = own if options.out is None else options.out
     try:
@@ -34,7 +38,7 @@ def main(arguments: list[str] | None = None) -> int:
         for name in names:
             clock = perf_counter()
             print(f"{name}: started", file=sys.stderr, flush=True)
-            findings = importlib.import_module(f"studies.{name}").run(quick=options.quick)
+            findings = importlib.import_module(f"studies.{name}").run(quick=options.quick, **special)
             write(folder, name, findings)
             print(f"{name}: {perf_counter() - clock:.0f} s, wrote {folder / name}.png, .csv, .json", file=sys.stderr)
             for key, value in findings.numbers.items():
