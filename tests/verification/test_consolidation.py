@@ -1,8 +1,8 @@
 """Consolidation against the series of Terzaghi, Mandel and Cryer.
 
-Loads are 1e-6 µ, so that the finite-strain model departs from the linear theory by less than 1e-6 of the signal. Every case runs
-with the steps Δt, Δt/2 and Δt/4: that gives the observed order, and extrapolation leaves an error of Δt³. Lengths are in mm,
-times in units of L²/c_v, pressures in units of the load, displacements in units of load/M times the length.
+Loads are 1e-6 µ, so that the finite-strain model departs from the linear theory by less than 1e-6 of the signal. Every case
+runs with the steps Δt, Δt/2 and Δt/4: that gives the observed order, and extrapolation leaves an error of Δt³. Lengths are in
+mm, times in units of L²/c_v, pressures in units of the load, displacements in units of load/M times the length.
 """
 
 from dataclasses import dataclass
@@ -235,8 +235,8 @@ class UnderPlate(Uncharged):
         def slope(w):
             return Grad(w).Trace()[1, 0]
 
-        bending = self.tension * slope(state.u) * slope(tests[0])
-        return [*super().terms(state, tests), Term("momentum", "plate", bending, boundary="top")]
+        straightening = self.tension * slope(state.u) * slope(tests[0])
+        return [*super().terms(state, tests), Term("momentum", "plate", straightening, boundary="top")]
 
 
 PLACES = (0.0, 0.5, 0.8)
