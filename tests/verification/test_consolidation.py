@@ -1,8 +1,8 @@
 """Consolidation against the series of Terzaghi, Mandel and Cryer.
 
 Loads are 1e-6 µ, so that the finite-strain model departs from the linear theory by less than 1e-6 of the signal. Every case
-runs with the steps Δt, Δt/2 and Δt/4: that gives the observed order, and extrapolation leaves an error of Δt³. Lengths are in
-mm, times in units of L²/c_v, pressures in units of the load, displacements in units of load/M times the length.
+runs with the steps Δt, Δt/2 and Δt/4: that gives the observed order, and extrapolation leaves an error of Δt³. Lengths are
+in mm, times in units of L²/c_v, pressures in units of the load, displacements in units of load/M times the length.
 """
 
 from dataclasses import dataclass
@@ -112,11 +112,16 @@ def test_series_agree_with_their_laplace_transforms(mu, lam):
     material = Material(**{**SOLID, "mu": mu, "lam": lam}, K=1e-3)
     modulus, eta, b = 2 * mu + lam, 4 * mu / (2 * mu + lam), mu / (mu + lam)
 
-    def mandel(s, xi):
-        # p + b p̄ diffuses from (1 + b)/2: p̂ = A [1 − cosh qξ / cosh q] with s A = (1 + b)/2 − s b p̄
+    def slab(s):
+        # p + b p̄ diffuses from (1 + b)/2: p̂ = A [1 − cosh qξ / cosh q], s A = (1 + b)/2 − s b p̄, p̄ = A (1 − tanh q / q)
         q = np.sqrt(s)
-        A = (1 + b) / 2 / (s * (1 + b * (1 - np.tanh(q) / q)))
-        return A * (1 - np.cosh(q * xi) / np.cosh(q))
+        return (1 + b) / 2 / (s * (1 + b * (1 - np.tanh(q) / q)))
+
+    def mandel(s, xi):
+        return slab(s) * (1 - np.cosh(np.sqrt(s) * xi) / np.cosh(np.sqrt(s)))
+
+    def shortening(s):
+        return (modulus / (2 * mu) / s - slab(s) * (1 - np.tanh(np.sqrt(s)) / np.sqrt(s))) / (2 * mu + 2 * lam)
 
     def sphere(s):
         q = np.sqrt(s)
@@ -136,6 +141,8 @@ def test_series_agree_with_their_laplace_transforms(mu, lam):
                 assert pressure(material, 1.0, 1.3, 1.3 * xi, T * unit) == pytest.approx(inverse, abs=1e-9)
         settled = inverse_laplace(lambda s: sphere(s)[1] / sphere(s)[0] / modulus, T)
         assert series.cryer_settlement(material, 1.0, 1.3, T * unit) / 1.3 == pytest.approx(settled, rel=1e-9)
+        settled = inverse_laplace(shortening, T)
+        assert series.mandel_shortening(material, 1.0, 1.3, T * unit) == pytest.approx(settled, rel=1e-9)
         settled = inverse_laplace(lambda s: np.tanh(np.sqrt(s)) / np.sqrt(s) / s / modulus, T)
         assert series.terzaghi_settlement(material, 1.0, 1.3, T * unit) / 1.3 == pytest.approx(settled, rel=1e-9)
 
