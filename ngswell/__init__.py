@@ -5,7 +5,7 @@ from __future__ import annotations
 from ngswell.baths import Bath, Essential, Frozen, Lagged, Penalty
 from ngswell.errors import InputError, NgswellError, OutputError, StepError
 from ngswell.kinematics import Axisymmetric, Confined, PlaneStrain, Solid
-from ngswell.materials import TABLE_1, TABLE_2, Material
+from ngswell.materials import TABLE_1, TABLE_2, HolmesMow, MackieMeares, Material, PowerLaw
 from ngswell.meshes import column, rectangle
 from ngswell.models import Concentration, LocalDonnan, Uncharged
 from ngswell.newton import Newton
@@ -19,8 +19,8 @@ __version__ = "0.1.0"
 
 __all__ = [
     "TABLE_1", "TABLE_2", "VTK", "Adaptive", "Area", "Axisymmetric", "Bath", "Blend", "Concentration", "Confined",
-    "Essential", "Fixed", "Frozen", "InputError", "Integral", "Lagged", "Ledger", "LocalDonnan", "Material",
-    "Newton", "NgswellError", "OutputError", "Penalty", "Pin", "PlaneStrain", "Probe", "Progress", "Ramp",
-    "Result", "Roller", "Scene", "Snapshots", "Solid", "StepError", "Symmetry", "Traction", "Uncharged", "Weight",
-    "column", "rectangle",
+    "Essential", "Fixed", "Frozen", "HolmesMow", "InputError", "Integral", "Lagged", "Ledger", "LocalDonnan",
+    "MackieMeares", "Material", "Newton", "NgswellError", "OutputError", "Penalty", "Pin", "PlaneStrain", "PowerLaw",
+    "Probe", "Progress", "Ramp", "Result", "Roller", "Scene", "Snapshots", "Solid", "StepError", "Symmetry", "Traction",
+    "Uncharged", "Weight", "column", "rectangle",
 ]  # fmt: skip

@@ -38,8 +38,9 @@ def homogeneous_equilibrium(
 
         µ (J^(2/d) − 1) + λ (1 − nS0)² [J/(1 − nS0) − J/(J − nS0)] = J (p_D(c̄, cfc) − load).
 
-    `boundary_charge` [mol/l] replaces cfc(J) in p_D: a boundary condition that does not follow the deformation.
-    Raises InputError for parameters that vary in space.
+    p_D has the material's Γ, φ and φ̄; with φ Γ > φ̄ a weak gel may swell without bound. `boundary_charge` [mol/l]
+    replaces cfc(J) in p_D: a boundary condition that does not follow the deformation.
+    Raises InputError for parameters that vary in space and where there is no equilibrium.
     """
     if motion not in FREE_DIRECTIONS:
         raise InputError(f"motion {motion!r} is none of {', '.join(FREE_DIRECTIONS)}")
@@ -49,7 +50,8 @@ def homogeneous_equilibrium(
         return (1 - nS0) * cfc0 / (J - nS0)
 
     def pressure(J: float) -> float:
-        return donnan.pressure(bath, charge(J) if boundary_charge is None else boundary_charge, material.RT, hydraulic)
+        cfc, m = charge(J) if boundary_charge is None else boundary_charge, material
+        return donnan.pressure(bath, cfc, m.RT, hydraulic, m.Gamma, m.phi, m.phi_bath)
 
     def excess(J: float) -> float:
         extra = mu * (J ** (2 / FREE_DIRECTIONS[motion]) - 1)
@@ -57,6 +59,8 @@ def homogeneous_equilibrium(
         return extra - J * (pressure(J) - load)
 
     low, high = nS0 * (1 + 1e-12), 1.0
+    if excess(low) > 0:
+        raise InputError("no equilibrium: the body collapses to the compression point, lam = 0 does not resist")
     while excess(high) < 0:
         high *= 2
         if high > 1e9:
@@ -66,7 +70,7 @@ def homogeneous_equilibrium(
         if middle in (low, high):
             break
         low, high = (middle, high) if excess(middle) < 0 else (low, middle)
-    c = donnan.cations(bath, charge(high) if boundary_charge is None else boundary_charge)
+    c = donnan.cations(bath, charge(high) if boundary_charge is None else boundary_charge, material.Gamma)
     return Equilibrium(high, charge(high), nS0 / high, c, pressure(high))
 
 
@@ -78,7 +82,7 @@ def lagged_column_factor(material: Material, bath: float) -> float:
     whatever the time step; the column is stable while it stays above −1.
     """
     mu, lam, nS0, cfc0 = (_number(name, getattr(material, name)) for name in ("mu", "lam", "nS0", "cfc0"))
-    slope = 2 * material.RT * (cfc0 / 4) / (bath * bath + cfc0 * cfc0 / 4) ** 0.5
+    slope = 2 * material.phi * material.RT * (cfc0 / 4) / ((material.Gamma * bath) ** 2 + cfc0 * cfc0 / 4) ** 0.5
     return slope * (-cfc0 / (1 - nS0)) / (2 * mu + lam)
 
 

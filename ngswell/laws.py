@@ -45,6 +45,16 @@ def extra_stress(F: CoefficientFunction, material: Material) -> CoefficientFunct
     return m.mu * (F * F.trans - one) + m.lam * (1 - m.nS0) ** 2 * (J / (1 - m.nS0) - J / (J - m.nS0)) * one
 
 
+def permeability(J: CoefficientFunction, material: Material) -> Field:
+    """K(J) by the material's law [mm⁴/(N s)]."""
+    return material.permeability(material.K, J, material.nS0)
+
+
+def diffusivities(nF: CoefficientFunction, material: Material) -> tuple[Field, Field]:
+    """D₊ and D₋ by the material's law [mm²/s]."""
+    return material.diffusivity(material.D_plus, nF), material.diffusivity(material.D_minus, nF)
+
+
 class Transport(NamedTuple):
     """Fluxes relative to the solid: nF wF [mm/s], nF c₊ w₊ and nF c₋ w₋ [mol/l mm/s]."""
 
@@ -64,20 +74,28 @@ def transport(
 ) -> Transport:
     """Extended Darcy and Fick laws with the electric potential eliminated by zero current, eqs. (19) to (22).
 
-    `drive` is grad p (less the fluid's weight where a scene has one). The pressure that drives is the overall one: with the
-    factor printed in (19) a gel in Donnan equilibrium with non-uniform charge would not come to rest. (20) is taken with
-    the porosity that D_L in (22) needs; ion saturations are zero.
+    `drive` is grad p (less the fluid's weight where a scene has one). With electrochemical potentials µ± over Rθ, grad µ± =
+    grad ln c± ± grad E/Rθ (activity coefficients constant in the gel), and the osmotic coefficient φ,
 
-        nF wF     = −K (drive + cfc grad E)
-        nF c± w±  = −nF D± (grad c± ± c± grad E / Rθ) + c± nF wF
-        grad E    = −Rθ/Θ [D_L/Rθ drive − (D₋ − D₊) grad c + D₋ grad cfc],
+        nF wF     = −K [drive − φ Rθ grad (c₊ + c₋) + Rθ (c₊ grad µ₊ + c₋ grad µ₋)] = −K (drive' + cfc grad E)
+        drive'    = drive + (1 − φ) Rθ grad (c₊ + c₋)
+        nF c± w±  = −nF D± c± grad µ± + c± nF wF = −nF D± (grad c± ± c± grad E / Rθ) + c± nF wF
+        grad E    = −Rθ/Θ [D_L/Rθ drive' − (D₋ − D₊) grad c + D₋ grad cfc],
         Θ = D₊ c + D₋ (c − cfc) + D_L cfc,   D_L = cfc K Rθ / nF
+
+    With φ = 1, the paper's, the overall pressure drives: with the factor printed in (19) a gel in Donnan equilibrium with
+    non-uniform charge would not come to rest. (20) is taken with the porosity that D_L in (22) needs; ion saturations
+    are zero. K and D± are those of the material's laws.
     """
-    m, RT = material, material.RT
-    D_L = cfc * m.K * RT / nF
-    conductance = m.D_plus * c + m.D_minus * (c - cfc) + D_L * cfc
-    field = -1 / conductance * (D_L / RT * drive - (m.D_minus - m.D_plus) * grad_c + m.D_minus * grad_cfc)  # grad E / Rθ
-    fluid = -m.K * (drive + RT * cfc * field)
-    plus = -nF * m.D_plus * (grad_c + c * field) + c * fluid
-    minus = -nF * m.D_minus * (grad_c - grad_cfc - (c - cfc) * field) + (c - cfc) * fluid
+    RT = material.RT
+    K = permeability(material.nS0 / (1 - nF), material)
+    D_plus, D_minus = diffusivities(nF, material)
+    if material.phi != 1:
+        drive = drive + (1 - material.phi) * RT * (2 * grad_c - grad_cfc)
+    D_L = cfc * K * RT / nF
+    conductance = D_plus * c + D_minus * (c - cfc) + D_L * cfc
+    field = -1 / conductance * (D_L / RT * drive - (D_minus - D_plus) * grad_c + D_minus * grad_cfc)  # grad E / Rθ
+    fluid = -K * (drive + RT * cfc * field)
+    plus = -nF * D_plus * (grad_c + c * field) + c * fluid
+    minus = -nF * D_minus * (grad_c - grad_cfc - (c - cfc) * field) + (c - cfc) * fluid
     return Transport(fluid, plus, minus)

@@ -1,12 +1,12 @@
-"""Material parameters with their units, checked; the two tables of the paper."""
+"""Material parameters with their units, checked; constitutive choices; the two tables of the paper."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from typing import NamedTuple, TypeAlias
+from typing import Any, NamedTuple, Protocol, TypeAlias
 
 import numpy as np
-from ngsolve import VOL, CoefficientFunction, Mesh
+from ngsolve import VOL, CoefficientFunction, Mesh, exp
 
 from ngswell.errors import InputError
 from ngswell.quadrature import points
@@ -35,33 +35,128 @@ _RANGES = {
     "D_minus": _Range(1e-9, 1e-1, "mm²/s", "1 mm²/s = 1e-6 m²/s; salt in water has about 1e-3 mm²/s"),
     "K": _Range(1e-11, 1e5, "mm⁴/(N s)", "1 mm⁴/(N s) = 1e-12 m⁴/(N s); K = kF/γFR"),
     "theta": _Range(200.0, 500.0, "K", "0 °C = 273.15 K"),
+    "phi": _Range(0.05, 5.0, "(an osmotic coefficient)", "1 is the ideal solution"),
+    "phi_bath": _Range(0.05, 5.0, "(an osmotic coefficient)", "1 is the ideal solution"),
+    "Gamma": _Range(0.05, 20.0, "(a ratio of activity coefficients)", "bath over gel; 1 is the ideal solution"),
+    "m": _Range(0.0, 50.0, "(an exponent)", "0 leaves the permeability constant; below 0 it would grow on compaction"),
+    "alpha": _Range(0.0, 50.0, "(an exponent)", "0 keeps pores open; below 0 the permeability would grow on compaction"),
+    "M": _Range(0.0, 50.0, "(an exponent)", "0 leaves the power of the void ratio"),
 }
+_ONE_NUMBER = {
+    "theta": "theta has to be one number [K]: the model is isothermal",
+    "phi": "phi has to be one number: the fluxes have it constant in the gel",
+    "phi_bath": "phi_bath has to be one number: it belongs to the solution outside",
+    "Gamma": "Gamma has to be one number: the fluxes have activity coefficients constant in the gel",
+}
+
+
+class Permeability(Protocol):
+    """K(J) from the parameter K = K0 [mm⁴/(N s)], J and nS0 [-], with K(1) = K0."""
+
+    def __call__(self, K0: Field, J: Field, nS0: Field, /) -> Field: ...
+
+
+class Diffusivity(Protocol):
+    """D in the pore fluid from the parameter D0 [mm²/s] and the porosity nF [-]."""
+
+    def __call__(self, D0: Field, nF: Field, /) -> Field: ...
+
+
+@dataclass(frozen=True)
+class Constant:
+    """K = K0 or D = D0 whatever the deformation, as in the paper."""
+
+    def __call__(self, value: Field, *state: Field) -> Field:
+        return value
+
+
+@dataclass(frozen=True)
+class PowerLaw:
+    """Permeability K = K0 [(J − nS0)/(1 − nS0)]^m, m ≥ 0 [-]; K → 0 at the compression point for m > 0.
+
+    The bracket is the void ratio nF/nS over its initial value, as in B. Markert, Transp. Porous Media 70 (2007) 427. The
+    power of the porosity nF/nF0 after G. Eipper (dissertation, Stuttgart 1998) lacks the factor J^m of this one.
+    """
+
+    m: float
+
+    def __post_init__(self) -> None:
+        _check("m", self.m)
+
+    def __call__(self, K0: Field, J: Field, nS0: Field) -> Field:
+        return K0 * void_ratio(J, nS0) ** self.m
+
+
+@dataclass(frozen=True)
+class HolmesMow:
+    """Permeability K = K0 [(J − nS0)/(1 − nS0)]^α exp[M (J² − 1)/2], α ≥ 0, M ≥ 0 [-].
+
+    M. H. Holmes and V. C. Mow, J. Biomech. 23 (1990) 1145, for cartilage.
+    """
+
+    alpha: float
+    M: float
+
+    def __post_init__(self) -> None:
+        _check("alpha", self.alpha)
+        _check("M", self.M)
+
+    def __call__(self, K0: Field, J: Field, nS0: Field) -> Field:
+        return K0 * void_ratio(J, nS0) ** self.alpha * exp(self.M / 2 * (J * J - 1))
+
+
+@dataclass(frozen=True)
+class MackieMeares:
+    """Diffusivity D = D0 [nF/(2 − nF)]²: the solid's chains lengthen the ions' paths.
+
+    D_plus and D_minus are then those of the free solution, D0. J. S. Mackie and P. Meares, Proc. R. Soc. A 232 (1955) 498.
+    """
+
+    def __call__(self, D0: Field, nF: Field) -> Field:
+        obstruction = nF / (2 - nF)
+        return D0 * (obstruction * obstruction)
+
+
+def void_ratio(J: Field, nS0: Field) -> Field:
+    """nF/nS over its initial value, (J − nS0)/(1 − nS0) [-]; zero at the compression point."""
+    return (J - nS0) / (1 - nS0)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Material:
     """A charged hydrated porous solid and its pore fluid.
 
-    Every parameter but the temperature is a float or a CoefficientFunction of position in the reference configuration.
-    Raises InputError for a value outside its possible (or, by orders of magnitude, plausible) range; fields of position
-    are checked when a scene brings the mesh.
+    The parameters up to K are floats or CoefficientFunctions of position in the reference configuration, the others are one
+    number or one law; left out, they are the paper's. Raises InputError for a value outside its possible (or, by orders of
+    magnitude, plausible) range; fields of position are checked when a scene brings the mesh.
     """
 
     mu: Field  # µS, shear modulus of the drained solid [N/mm²]
     lam: Field  # λS, second Lamé constant [N/mm²]
     nS0: Field  # nS0S, solidity of the reference configuration [-]
     cfc0: Field  # cfc0S, fixed charge per fluid volume of the reference configuration [mol/l]
-    D_plus: Field  # D₊, cation diffusivity [mm²/s]
-    D_minus: Field  # D₋, anion diffusivity [mm²/s]
-    K: Field  # kF/γFR, Darcy permeability over effective fluid weight [mm⁴/(N s)]
+    D_plus: Field  # D₊, cation diffusivity in the pore fluid (before a diffusivity law) [mm²/s]
+    D_minus: Field  # D₋, anion diffusivity, likewise [mm²/s]
+    K: Field  # kF/γFR, Darcy permeability over effective fluid weight, at J = 1 [mm⁴/(N s)]
     theta: float = 298.0  # θ, temperature [K]
+    permeability: Permeability = Constant()  # K(J)
+    diffusivity: Diffusivity = Constant()  # D₊(nF), D₋(nF)
+    phi: float = 1.0  # φ, osmotic coefficient of the pore fluid [-]
+    phi_bath: float = 1.0  # φ̄, osmotic coefficient of the bath [-]
+    Gamma: float = 1.0  # Γ = γ̄/γ, mean activity coefficient of the salt in the bath over that in the gel [-]
 
     def __post_init__(self) -> None:
+        reference = _sample("permeability", self.permeability, (1.0, 1.0, 0.5), "K(K0, J, nS0) such as PowerLaw(m=2.0)")
+        if abs(reference - 1) > 1e-12:
+            raise InputError(f"permeability = {self.permeability!r} gives K = {reference:g} K0 at J = 1; it has to give K0")
+        _sample("diffusivity", self.diffusivity, (1.0, 0.5), "D(D0, nF) such as MackieMeares()")
         for field in fields(self):
             value = getattr(self, field.name)
+            if field.name in ("permeability", "diffusivity"):
+                continue
             if isinstance(value, CoefficientFunction):
-                if field.name == "theta":
-                    raise InputError("theta has to be one number [K]: the model is isothermal")
+                if field.name in _ONE_NUMBER:
+                    raise InputError(_ONE_NUMBER[field.name])
                 if value.dim != 1:
                     raise InputError(f"{field.name} has to be scalar, got a CoefficientFunction of {value.dim} components")
             else:
@@ -86,6 +181,14 @@ class Material:
         """Largest value of the parameter `name` over the quadrature points of `mesh`, in the parameter's unit."""
         value = getattr(self, name)
         return float(value(points(mesh, VOL, 4)).max()) if isinstance(value, CoefficientFunction) else float(value)
+
+
+def _sample(name: str, law: Any, arguments: tuple[float, ...], example: str) -> float:
+    """Value of a law, refused if it is none."""
+    try:
+        return float(law(*arguments))
+    except TypeError:
+        raise InputError(f"{name} = {law!r} is not a law {example}") from None
 
 
 def _check(name: str, value: object) -> None:

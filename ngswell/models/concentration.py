@@ -31,11 +31,11 @@ class State(SolidState):
     def pore_pressure(self) -> CoefficientFunction:
         """p with the osmotic pressure of the charge at the point in place of the smooth field's [N/mm²].
 
-        At the salt concentration c̃ = sqrt(c₊ c₋) of the bath in equilibrium with the point, (38) gives
-        p + 2 Rθ [sqrt(c̃² + cfc(J)²/4) − sqrt(c̃² + cfc²/4)], the last root being c − cfc/2.
+        At the salt concentration c̃ = sqrt(c₊ c₋) of the (ideal) bath in equilibrium with the point, (38) gives
+        p + 2 φ Rθ [sqrt(c̃² + cfc(J)²/4) − sqrt(c̃² + cfc²/4)], the last root being c − cfc/2.
         """
         root = sqrt(self.c * (self.c - self.cfc) + self.pointwise_charge * self.pointwise_charge / 4)
-        return self.p + 2 * self.material.RT * (root - self.c + self.cfc / 2)
+        return self.p + 2 * self.material.phi * self.material.RT * (root - self.c + self.cfc / 2)
 
     def transport(self, frame: CoefficientFunction) -> laws.Transport:
         """Fluxes from gradients in the `frame` (a matrix on reference gradients): `pull` or `push`."""
@@ -49,7 +49,7 @@ class State(SolidState):
         return {
             **self.solid_outputs(self.pore_pressure),
             "p": self.p,
-            "hydraulic_pressure": self.p - self.material.RT * (self.c + anions),
+            "hydraulic_pressure": self.p - self.material.phi * self.material.RT * (self.c + anions),
             "c_plus": self.c,
             "c_minus": anions,
             "cfc": self.cfc,
@@ -109,7 +109,11 @@ class Concentration:
         return State(material, kinematics, charge, weight, *functions)
 
     def equilibrium(self, bath: BathFields, cfc: CoefficientFunction, material: Material) -> dict[str, CoefficientFunction]:
-        return {"p": donnan.pressure(bath.c, cfc, material.RT, bath.P), "c": donnan.cations(bath.c, cfc)}
+        m = material
+        return {
+            "p": donnan.pressure(bath.c, cfc, m.RT, bath.P, m.Gamma, m.phi, m.phi_bath),
+            "c": donnan.cations(bath.c, cfc, m.Gamma),
+        }
 
     def terms(self, state: State, tests: Sequence[CoefficientFunction]) -> list[Term]:
         v, q, d, r = tests

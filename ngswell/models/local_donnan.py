@@ -9,7 +9,7 @@ from typing import ClassVar
 
 from ngsolve import H1, CoefficientFunction, FESpace, InnerProduct, Mesh
 
-from ngswell import donnan
+from ngswell import donnan, laws
 from ngswell.baths import Bath, BathFields, Essential, Penalty
 from ngswell.errors import InputError
 from ngswell.kinematics import Kinematics
@@ -28,35 +28,41 @@ class State(SolidState):
 
     @cached_property
     def pore_pressure(self) -> CoefficientFunction:
-        """Overall pressure p = P + 2 Rθ [sqrt(c̄² + cfc²/4) − c̄], eq. (38) [N/mm²]."""
-        return donnan.pressure(self.bath.c, self.pointwise_charge, self.material.RT, self.P)
+        """Overall pressure p = P + 2 Rθ [φ sqrt((Γ c̄)² + cfc²/4) − φ̄ c̄], eq. (38) [N/mm²]."""
+        m = self.material
+        return donnan.pressure(self.bath.c, self.pointwise_charge, m.RT, self.P, m.Gamma, m.phi, m.phi_bath)
 
     @cached_property
     def cations(self) -> CoefficientFunction:
         """c₊ of (23)₁ [mol/l]."""
-        return donnan.cations(self.bath.c, self.pointwise_charge)
+        return donnan.cations(self.bath.c, self.pointwise_charge, self.material.Gamma)
+
+    @cached_property
+    def anions(self) -> CoefficientFunction:
+        """c₋ = c₊ − cfc [mol/l]."""
+        return donnan.anions(self.bath.c, self.pointwise_charge, self.material.Gamma)
 
     def seepage(self, frame: CoefficientFunction) -> CoefficientFunction:
         """nF wF = −K grad P / (1 + K Rθ cfc² / [nF (D₊ c₊ + D₋ c₋)]) in the `frame` (`pull` or `push`) [mm/s].
 
         Fluid that drags its charge along builds up a streaming potential; zero current (21) with uniform salt makes it
-        a smaller permeability.
+        a smaller permeability. K and D± are those of the material's laws.
         """
-        m, cfc = self.material, self.pointwise_charge
-        conductance = m.D_plus * self.cations + m.D_minus * donnan.anions(self.bath.c, cfc)
-        drag = m.K * m.RT * cfc * cfc / (self.nF * conductance)
-        return -m.K / (1 + drag) * (frame * self.drive(self.P))
+        K, cfc = self.permeability, self.pointwise_charge
+        D_plus, D_minus = laws.diffusivities(self.nF, self.material)
+        conductance = D_plus * self.cations + D_minus * self.anions
+        drag = K * self.material.RT * cfc * cfc / (self.nF * conductance)
+        return -K / (1 + drag) * (frame * self.drive(self.P))
 
     def outputs(self) -> dict[str, CoefficientFunction]:
         """Named fields in the current configuration; `ngswell.models.OUTPUT_UNITS` has their units."""
-        cfc = self.pointwise_charge
         return {
             **self.solid_outputs(self.pore_pressure),
             "p": self.pore_pressure,
-            "hydraulic_pressure": self.P - 2 * self.material.RT * self.bath.c,
+            "hydraulic_pressure": self.P - 2 * self.material.phi_bath * self.material.RT * self.bath.c,
             "c_plus": self.cations,
-            "c_minus": donnan.anions(self.bath.c, cfc),
-            "cfc": cfc,
+            "c_minus": self.anions,
+            "cfc": self.pointwise_charge,
             "seepage": self.seepage(self.push),
         }
 

@@ -61,6 +61,11 @@ class SolidState:
         return 1 - laws.solidity(self.J, self.material)
 
     @cached_property
+    def permeability(self) -> Field:
+        """K(J) [mm⁴/(N s)]."""
+        return laws.permeability(self.J, self.material)
+
+    @cached_property
     def pointwise_charge(self) -> CoefficientFunction:
         """cfc(J) at the point [mol/l]."""
         return laws.fixed_charge(self.J, self.material, self.charge)

@@ -25,7 +25,7 @@ class State(SolidState):
 
     def seepage(self, frame: CoefficientFunction) -> CoefficientFunction:
         """Darcy's law nF wF = −K grad p in the `frame` (`pull` or `push`) [mm/s]."""
-        return -self.material.K * (frame * self.drive(self.p))
+        return -self.permeability * (frame * self.drive(self.p))
 
     def outputs(self) -> dict[str, CoefficientFunction]:
         """Named fields in the current configuration; `ngswell.models.OUTPUT_UNITS` has their units."""
