@@ -85,8 +85,8 @@ def test_free_block_comes_to_the_closed_form(model):
 # -- charge that varies ------------------------------------------------------------------------------------------------
 
 
-def at_rest(n, choice, model=None, bath=1.0):
-    """A stress-free block whose charge and stiffness vary, brought to rest in one bath."""
+def at_rest(n, choice):
+    """A free block whose charge and stiffness vary, brought to rest in 1 mol/l."""
     material = Material(
         mu=0.12 * (1 + y), lam=0.02, nS0=0.2 + 0.1 * x, cfc0=0.3 + 0.3 * x * y, D_plus=5e-4, D_minus=8e-4, K=1e-3, **choice
     )
@@ -94,11 +94,10 @@ def at_rest(n, choice, model=None, bath=1.0):
         mesh=rectangle(1.0, 1.0, n, n),
         kinematics=PlaneStrain(),
         material=material,
-        model=Concentration() if model is None else model,
         supports=[Symmetry("left"), Symmetry("bottom")],
-        baths=[Bath("top|right", c=bath)],
+        baths=[Bath("top|right", c=1.0)],
         charge=Ramp((0, 0.0), (100, 1.0)),
-        initial=(bath, 0.0),
+        initial=(1.0, 0.0),
     )
     scene.run(1e7, Adaptive(5e-2))
     return scene
