@@ -152,6 +152,24 @@ def test_factors_enter_where_they_should():
     assert all((a == b).all() for a, b in zip(outside, plain, strict=True))
 
 
+@pytest.mark.parametrize("material", MATERIALS)
+def test_local_donnan_has_the_same_seepage(material):
+    # Uniform stretch 1.2, P falling by 0.3 N/mm² per reference mm: ions in equilibrium, so grad c = grad cfc = 0.
+    problem = confined_column(cells=1, material=material, model=LocalDonnan()).problem
+    problem.initialise()
+    u, P = problem.fields.components
+    u.Set(0.2 * x)
+    P.Set(-0.3 * x)
+    cfc = 0.75 * 0.8 / 0.95
+    c = donnan.cations(0.15, cfc, material.Gamma)
+    none = CF(0.0)
+    full = laws.transport(material, CF(1 - 0.25 / 1.2), CF(c), CF(cfc), CF(-0.3 / 1.2), none, none)
+    middle = problem.mesh(0.25)
+    seepage = problem.state.outputs()["seepage"](middle)
+    assert seepage == pytest.approx(full.fluid(POINT), rel=1e-12)
+    assert problem.state.outputs()["c_plus"](middle) == pytest.approx(c, rel=1e-12)
+
+
 # -- equilibrium with a bath -------------------------------------------------------------------------------------------
 
 
