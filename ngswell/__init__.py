@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from ngswell.baths import Bath, Essential, Frozen, Lagged, Penalty
 from ngswell.errors import InputError, NgswellError, OutputError, StepError
+from ngswell.gmsh import read_mesh
 from ngswell.kinematics import Axisymmetric, Confined, PlaneStrain, Solid
 from ngswell.materials import TABLE_1, TABLE_2, HolmesMow, MackieMeares, Material, PowerLaw
-from ngswell.meshes import column, rectangle
+from ngswell.meshes import box, check_mesh, column, from_occ, rectangle
 from ngswell.models import Concentration, LocalDonnan, Uncharged
 from ngswell.newton import Newton
 from ngswell.observers import VTK, Area, Integral, Ledger, Probe, Progress, Snapshots
@@ -22,5 +23,5 @@ __all__ = [
     "Essential", "Fixed", "Frozen", "HolmesMow", "InputError", "Integral", "Lagged", "Ledger", "LocalDonnan",
     "MackieMeares", "Material", "Newton", "NgswellError", "OutputError", "Penalty", "Pin", "PlaneStrain", "PowerLaw",
     "Probe", "Progress", "Ramp", "Result", "Roller", "Scene", "Snapshots", "Solid", "StepError", "Symmetry", "Traction",
-    "Uncharged", "Weight", "column", "rectangle",
+    "Uncharged", "Weight", "box", "check_mesh", "column", "from_occ", "read_mesh", "rectangle",
 ]  # fmt: skip

@@ -1,28 +1,191 @@
-"""Structured meshes with named boundaries."""
+"""Meshes with named boundaries: structured and graded, from CAD shapes; and the check that their cells are sound."""
 
 from __future__ import annotations
 
-from ngsolve import Mesh
-from ngsolve.meshes import Make1DMesh, MakeStructured2DMesh
+from collections.abc import Iterable
+from math import isfinite, log
+from typing import Any
+
+import numpy as np
+from netgen.occ import OCCGeometry
+from ngsolve import ET, VOL, ElementId, IntegrationRule, Mesh, specialcf
+from ngsolve.meshes import Make1DMesh, MakeStructured2DMesh, MakeStructured3DMesh
+from numpy.typing import NDArray
 
 from ngswell.errors import InputError
 
+Grade = dict[str, float]
+"""Boundary name → how many times thinner the cell at that boundary is than the largest of its row [-]."""
 
-def column(height: float, cells: int) -> Mesh:
-    """A segment of `height` [mm] with boundaries "bottom" (x = 0) and "top"."""
-    _positive("column", (height, cells))
-    mesh = Make1DMesh(cells, mapping=lambda s: height * s)
-    mesh.ngmesh.SetBCName(0, "bottom")
-    mesh.ngmesh.SetBCName(1, "top")
+_CELLS = {
+    1: {"segment": ET.SEGM},
+    2: {"triangle": ET.TRIG, "quadrilateral": ET.QUAD},
+    3: {"tetrahedron": ET.TET, "hexahedron": ET.HEX, "prism": ET.PRISM, "pyramid": ET.PYRAMID},
+}
+
+
+def column(height: float, cells: int, grade: Grade | None = None) -> Mesh:
+    """A segment of `height` [mm] with boundaries "bottom" (x = 0) and "top".
+
+    `grade={"top": 10}` thins the cells in a geometric progression: the one at the top has a tenth of the length of the
+    largest, at the bottom. Towards both ends, the largest is in the middle.
+    """
+    _check_sizes("column", (height,), (cells,))
+    (nodes,) = _graded("column", (height,), (cells,), (("bottom", "top"),), grade)
+    mesh = Make1DMesh(cells, mapping=lambda s: nodes[round(cells * s)])
+    for number, name in enumerate(("bottom", "top")):
+        mesh.ngmesh.SetBCName(number, name)
     return mesh
 
 
-def rectangle(width: float, height: float, nx: int, ny: int) -> Mesh:
-    """Quadrilaterals on [0, width] × [0, height] [mm] with boundaries "bottom", "right", "top", "left"."""
-    _positive("rectangle", (width, height, nx, ny))
-    return MakeStructured2DMesh(quads=True, nx=nx, ny=ny, mapping=lambda s, t: (width * s, height * t))
+def rectangle(width: float, height: float, nx: int, ny: int, triangles: bool = False, grade: Grade | None = None) -> Mesh:
+    """Cells on [0, width] × [0, height] [mm] with boundaries "bottom", "right", "top", "left".
+
+    Quadrilaterals, or `triangles`, two in each. `grade` thins the cells towards boundaries, as in `column`.
+    """
+    _check_sizes("rectangle", (width, height), (nx, ny))
+    xs, ys = _graded("rectangle", (width, height), (nx, ny), (("left", "right"), ("bottom", "top")), grade)
+    return MakeStructured2DMesh(
+        quads=not triangles, nx=nx, ny=ny, mapping=lambda s, t: (xs[round(nx * s)], ys[round(ny * t)])
+    )
 
 
-def _positive(name: str, values: tuple[float, ...]) -> None:
-    if not all(value > 0 for value in values):
-        raise InputError(f"{name}: sizes and numbers of cells have to be positive, got {values}")
+def box(
+    width: float,
+    depth: float,
+    height: float,
+    nx: int,
+    ny: int,
+    nz: int,
+    cells: str = "hexahedra",
+    grade: Grade | None = None,
+) -> Mesh:
+    """Cells on [0, width] × [0, depth] × [0, height] [mm].
+
+    Boundaries: "left" (x = 0) and "right", "front" (y = 0) and "back", "bottom" (z = 0) and "top". `cells` are "hexahedra",
+    or two "prisms" (triangles in x and y, extruded in z) or six "tetrahedra" in each. `grade` as in `column`.
+    """
+    if cells not in ("hexahedra", "prisms", "tetrahedra"):
+        raise InputError(f"box: cells {cells!r} are none of hexahedra, prisms, tetrahedra")
+    _check_sizes("box", (width, depth, height), (nx, ny, nz))
+    sides = (("left", "right"), ("front", "back"), ("bottom", "top"))
+    xs, ys, zs = _graded("box", (width, depth, height), (nx, ny, nz), sides, grade)
+    mesh = MakeStructured3DMesh(
+        hexes=cells == "hexahedra",
+        prism=cells == "prisms",
+        nx=nx,
+        ny=ny,
+        nz=nz,
+        mapping=lambda r, s, t: (xs[round(nx * r)], ys[round(ny * s)], zs[round(nz * t)]),
+    )
+    # NGSolve looks along x and counts the sides x = 0, y = 0, x = width, y = depth, z = 0, z = height.
+    for number, name in enumerate(("left", "front", "right", "back", "bottom", "top")):
+        mesh.ngmesh.SetBCName(number, name)
+    return mesh
+
+
+def from_occ(shape: Any, maxh: float, order: int = 1, quads: bool = False) -> Mesh:
+    """Mesh a shape of `netgen.occ` in mm: a face in the plane z = 0 with named edges, or a solid with named faces.
+
+    `maxh` is the largest cell size [mm]; the cells follow curved sides with polynomials of `order`, best the
+    displacement's. `quads` meshes a face with quadrilaterals where it can, with triangles where it cannot. Unnamed sides
+    are sealed and free.
+
+        disc = WorkPlane().Circle(2.0).Face()
+        disc.edges.name = "rim"
+        mesh = from_occ(disc, maxh=0.5, order=2)
+    """
+    if not (isfinite(maxh) and maxh > 0):
+        raise InputError(f"from_occ: maxh = {maxh!r} mm has to be positive")
+    if not (isinstance(order, int) and 1 <= order <= 10):
+        raise InputError(f"from_occ: order {order!r} of the curved sides is not one of 1, 2, … 10")
+    solid = len(shape.solids) > 0
+    if solid and quads:
+        raise InputError("from_occ: a solid is meshed with tetrahedra; quads is for faces")
+    if not solid and not len(shape.faces):
+        raise InputError("from_occ: the shape has neither a solid nor a face")
+    sides = "faces" if solid else "edges"
+    names = [side.name or "" for side in getattr(shape, sides)]
+    check_named("from_occ", names, f"name some of the shape's {sides}, shape.{sides}.name = 'rim'")
+    if not solid:
+        check_plane("from_occ", np.array([vertex.p[2] for vertex in shape.vertices]))
+    geometry = OCCGeometry(shape) if solid else OCCGeometry(shape, dim=2)
+    mesh = Mesh(geometry.GenerateMesh(maxh=maxh, quad_dominated=quads))
+    mesh.Curve(order)
+    check_mesh(mesh)
+    return mesh
+
+
+def check_mesh(mesh: Mesh) -> None:
+    """Refuse cells that are turned inside out or have no size, by number and place.
+
+    At the integration points of degree 4 the determinant of the cell's mapping has to have the sign it has in most cells of
+    the same shape (which one depends on how the mesh generator numbers the corners), and the cell's thickness, determinant
+    over largest stretch to the power d − 1, has to be above round-off of the body's size.
+    """
+    round_off = 1e-12 * float(np.ptp(mesh.ngmesh.Coordinates(), axis=0).max())
+    for name, shape in _CELLS[mesh.dim].items():
+        where = mesh.MapToAllElements({shape: IntegrationRule(shape, 4)}, VOL)
+        if not len(where):
+            continue
+        mapping = specialcf.JacobianMatrix(mesh.dim)(where).reshape(-1, mesh.dim, mesh.dim)
+        det = np.linalg.det(mapping)
+        stretch = np.linalg.norm(mapping, axis=1).max(axis=1)
+        thickness = np.sign(np.median(det)) * det / np.maximum(stretch, round_off) ** (mesh.dim - 1)
+        bad = np.unique(where["nr"][~(thickness > round_off)])
+        if len(bad):
+            inverted = thickness[where["nr"] == bad[0]].min() < -round_off
+            corners = [mesh[vertex].point for vertex in mesh[ElementId(VOL, int(bad[0]))].vertices]
+            place = ", ".join(f"{x:.4g}" for x in np.mean(corners, axis=0))
+            raise InputError(
+                f"mesh: cell {bad[0]}, a {name} near ({place}) mm, {'is turned inside out' if inverted else 'has no size'}"
+                f"{f', as {len(bad) - 1} more' if len(bad) > 1 else ''}: move its corners, or mesh the body again"
+            )
+
+
+def check_named(what: str, names: Iterable[str], remedy: str) -> None:
+    """Refuse a mesh none of whose boundaries has a name: supports and baths could not find them."""
+    if not set(names) - {"", "default"}:
+        raise InputError(f"{what}: no boundary has a name; {remedy}")
+
+
+def check_plane(what: str, heights: NDArray) -> None:
+    """Refuse a 2-d body outside the plane z = 0; `heights` are the z of its corners [mm]."""
+    if np.abs(heights).max() > 1e-9:
+        raise InputError(
+            f"{what}: a 2-d body lies in the plane z = 0, this one reaches z = {heights[np.abs(heights).argmax()]:g}"
+        )
+
+
+def _check_sizes(what: str, sizes: tuple[float, ...], cells: tuple[int, ...]) -> None:
+    if not all(isfinite(size) and size > 0 for size in sizes):
+        raise InputError(f"{what}: sizes have to be positive and finite, got {sizes} mm")
+    if not all(isinstance(number, (int, np.integer)) and number > 0 for number in cells):
+        raise InputError(f"{what}: numbers of cells have to be positive integers, got {cells}")
+
+
+def _graded(
+    what: str, sizes: tuple[float, ...], cells: tuple[int, ...], sides: tuple[tuple[str, str], ...], grade: Grade | None
+) -> list[list[float]]:
+    """Node coordinates [mm] along each axis, whose two ends are named in `sides`."""
+    grade = grade or {}
+    names = [name for pair in sides for name in pair]
+    for name, ratio in grade.items():
+        if name not in names:
+            raise InputError(f"{what}: grade names {name!r}, which is none of {', '.join(names)}")
+        if not 1 <= ratio <= 1e6:
+            raise InputError(f"{what}: grade {ratio!r} at {name!r} is outside 1 … 1e6; it is largest over smallest cell")
+    return [
+        _nodes(size, number, grade.get(low, 1.0), grade.get(high, 1.0))
+        for size, number, (low, high) in zip(sizes, cells, sides, strict=True)
+    ]
+
+
+def _nodes(length: float, cells: int, low: float, high: float) -> list[float]:
+    """Nodes of `cells` cells on [0, length], thinned `low` and `high` times at the ends, in geometric progressions."""
+    index = np.arange(cells)
+    both = low > 1 and high > 1
+    reach = max(1, (cells - 1) // 2 if both else cells - 1)  # cells from an end to the largest
+    thinning = log(low) * np.maximum(0, 1 - index / reach) + log(high) * np.maximum(0, 1 - (cells - 1 - index) / reach)
+    nodes = np.concatenate([[0.0], np.cumsum(np.exp(-thinning))])
+    return [*(length * nodes[:-1] / nodes[-1]), length]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import matplotlib as mpl
@@ -56,18 +57,38 @@ class Picture:
 
 
 def on_deformed_body(problem: Problem, field: CoefficientFunction, cuts: int = 3) -> Picture:
-    """Sample `field` on the deformed cells of a 2-d mesh of quadrilaterals, each cut into `cuts`² pieces."""
-    if problem.mesh.dim != 2 or any(element.type != ET.QUAD for element in problem.mesh.Elements(VOL)):
-        raise InputError("pictures of the deformed body need a 2-d mesh of quadrilaterals")
-    side = np.linspace(0.0, 1.0, cuts + 1)
-    local = [(a, b) for b in side for a in side]
-    where = problem.mesh.MapToAllElements({ET.QUAD: IntegrationRule(local, [0.0] * len(local))}, VOL)
-    deformed = (CF((x, y)) + problem.state.u)(where)
-    n = cuts + 1
-    corner = np.array([row * n + column for row in range(cuts) for column in range(cuts)])
-    halves = [np.stack([corner, corner + 1, corner + n + 1], 1), np.stack([corner, corner + n + 1, corner + n], 1)]
-    offsets = np.arange(problem.mesh.ne) * len(local)
-    triangles = (offsets[:, None, None] + np.concatenate(halves)).reshape(-1, 3)
-    rim = [*range(cuts), *range(cuts, n * n - 1, n), *range(n * n - 1, n * cuts, -1), *range(n * cuts, -1, -n)]
-    mesh = Triangulation(deformed[:, 0], deformed[:, 1], triangles)
-    return Picture(mesh, field(where).ravel(), deformed[offsets[:, None] + np.array(rim)])
+    """Sample `field` on the deformed cells of a 2-d mesh, each cut into `cuts`² pieces."""
+    if problem.mesh.dim != 2:
+        raise InputError("pictures of the deformed body need a 2-d mesh")
+    triangles, places, values, outlines, count = [], [], [], [], 0
+    for shape in (ET.QUAD, ET.TRIG):
+        local, pieces, rim = _cut(shape, cuts)
+        where = problem.mesh.MapToAllElements({shape: IntegrationRule(local, [0.0] * len(local))}, VOL)
+        if not len(where):
+            continue
+        deformed = (CF((x, y)) + problem.state.u)(where)
+        offsets = np.arange(0, len(deformed), len(local))
+        triangles.append((count + offsets[:, None, None] + pieces).reshape(-1, 3))
+        places.append(deformed)
+        values.append(field(where).ravel())
+        outlines.append(deformed[offsets[:, None] + rim])
+        count += len(deformed)
+    points = np.concatenate(places)
+    mesh = Triangulation(points[:, 0], points[:, 1], np.concatenate(triangles))
+    return Picture(mesh, np.concatenate(values), np.concatenate(outlines))
+
+
+def _cut(shape: ET, cuts: int) -> tuple[list[tuple[float, float]], NDArray, NDArray]:
+    """Points on the reference cell, the triangles between them, and the way round its rim, 4 `cuts` + 1 points."""
+    steps = range(cuts + 1)
+    grid = [(i, j) for i in steps for j in steps if shape == ET.QUAD or i + j <= cuts]
+    number = {place: index for index, place in enumerate(grid)}
+    pieces = [((i, j), (i + 1, j), (i, j + 1)) for i, j in grid]
+    pieces += [((i + 1, j), (i + 1, j + 1), (i, j + 1)) for i, j in grid]
+    triangles = np.array([[number[corner] for corner in piece] for piece in pieces if all(c in number for c in piece)])
+    if shape == ET.QUAD:
+        turns = [(0, 0), (cuts, 0), (cuts, cuts), (0, cuts), (0, 0)]
+    else:
+        turns = [(0, 0), (cuts, 0), (0, cuts), (0, 0), (0, 0)]  # the last side stands still: rims have one length
+    rim = [(a + (c - a) * k // cuts, b + (d - b) * k // cuts) for (a, b), (c, d) in pairwise(turns) for k in range(cuts)]
+    return [(i / cuts, j / cuts) for i, j in grid], triangles, np.array([number[place] for place in [*rim, (0, 0)]])

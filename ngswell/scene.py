@@ -18,6 +18,7 @@ from ngswell.equilibrium import equilibrate
 from ngswell.errors import InputError
 from ngswell.kinematics import Kinematics
 from ngswell.materials import Material
+from ngswell.meshes import check_mesh
 from ngswell.models import Concentration, Model
 from ngswell.newton import Newton
 from ngswell.observers.base import Observer
@@ -72,6 +73,7 @@ class Scene:
             raise InputError(
                 f"{type(self.kinematics).__name__} needs a {self.kinematics.dimension}-d mesh, this one is {self.mesh.dim}-d"
             )
+        check_mesh(self.mesh)
         self.material.check_on(self.mesh)
         self.model.check(self.material, self.baths)
         for value in self.charge.values:
