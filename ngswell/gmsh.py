@@ -145,15 +145,21 @@ def _parse(what: str, path: Path) -> _File:
         raise InputError(f"{what}: there is no such file")
     remedy = "in Gmsh, set Mesh.MshFileVersion = 4.1, Mesh.Binary = 0, Mesh.ElementOrder = 1"
     try:
-        sections = _sections(path.read_text(encoding="utf-8", errors="replace"))
-        version, binary = sections["MeshFormat"][0].split()[:2]
-    except (OSError, KeyError, IndexError, ValueError) as error:
+        text = path.read_text(encoding="utf-8", errors="replace")
+    except OSError as error:
+        raise InputError(f"{what}: the file cannot be read: {error}") from error
+    try:
+        start, header = text.split("\n", 2)[:2]
+        version, binary = header.split()[:2]
+    except ValueError as error:
         raise InputError(f"{what}: not a Gmsh mesh; {remedy}") from error
+    if start.strip() != "$MeshFormat":
+        raise InputError(f"{what}: not a Gmsh mesh; {remedy}")
     if version not in _READERS or binary != "0":
         kind = "binary" if binary != "0" else "text"
         raise InputError(f"{what}: Gmsh version {version} ({kind}) is not read, but 2.2 and 4.1 as text; {remedy}")
     try:
-        names = {}
+        sections, names = _sections(text), {}
         for line in sections.get("PhysicalNames", ["0"])[1:]:
             dim, number, name = line.split(maxsplit=2)
             names[int(dim), int(number)] = name.strip().strip('"')
@@ -180,16 +186,20 @@ def _sections(text: str) -> dict[str, list[str]]:
             sections[name] = []
         elif name is not None and line.strip():
             sections[name].append(line)
+    if name is not None:
+        raise ValueError(f"${name} is not closed")
     return sections
 
 
 def _version_2(sections: dict[str, list[str]]) -> tuple[dict[int, list[float]], Groups]:
     nodes, cells = {}, Groups()
-    for line in sections["Nodes"][1 : 1 + int(sections["Nodes"][0])]:
-        number, *place = line.split()
+    lines = iter(sections["Nodes"])
+    for _ in range(int(next(lines))):
+        number, *place = next(lines).split()
         nodes[int(number)] = [float(x) for x in place]
-    for line in sections["Elements"][1 : 1 + int(sections["Elements"][0])]:
-        _, kind, tags, *rest = (int(word) for word in line.split())
+    lines = iter(sections["Elements"])
+    for _ in range(int(next(lines))):
+        _, kind, tags, *rest = (int(word) for word in next(lines).split())
         cells.setdefault((kind, rest[0] if tags else 0), []).append(rest[tags:])
     return nodes, cells
 
@@ -213,7 +223,7 @@ def _version_4(sections: dict[str, list[str]]) -> tuple[dict[int, list[float]], 
     for _ in range(int(next(lines).split()[0])):
         dim, tag, kind, count = (int(word) for word in next(lines).split())
         block = [[int(word) for word in next(lines).split()[1:]] for _ in range(count)]
-        for group in groups[dim, tag] or [0]:
+        for group in groups.get((dim, tag)) or [0]:
             cells.setdefault((kind, group), []).extend(block)
     return nodes, cells
 

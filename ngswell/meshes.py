@@ -151,10 +151,9 @@ def check_named(what: str, names: Iterable[str], remedy: str) -> None:
 
 def check_plane(what: str, heights: NDArray) -> None:
     """Refuse a 2-d body outside the plane z = 0; `heights` are the z of its corners [mm]."""
-    if np.abs(heights).max() > 1e-9:
-        raise InputError(
-            f"{what}: a 2-d body lies in the plane z = 0, this one reaches z = {heights[np.abs(heights).argmax()]:g}"
-        )
+    highest = heights[np.abs(heights).argmax()]
+    if abs(highest) > 1e-9:
+        raise InputError(f"{what}: a 2-d body lies in the plane z = 0, this one reaches z = {highest:g} mm")
 
 
 def _check_sizes(what: str, sizes: tuple[float, ...], cells: tuple[int, ...]) -> None:
