@@ -3,7 +3,6 @@
 from math import cos, pi
 
 import meshio
-import netgen.meshing as netgen
 import numpy as np
 import pytest
 from netgen.occ import Axes, Box, Glue, WorkPlane, X, Y, Z
@@ -209,12 +208,12 @@ def test_quarter_disc_is_curved():
 
 
 def test_curved_sides_converge():
-    # Halved cells, quadratic sides: the area's error falls at least with h³, measured from the boundary's interpolation.
+    # Between an arc and its parabola lies an area of h⁵ for each of 1/h sides; 0.1 for what is not yet asymptotic.
     meshes = [quarter_disc(h, 2) for h in (0.4, 0.2, 0.1)]
     errors = [abs(Integrate(CF(1.0), mesh) / (pi / 4) - 1) for mesh in meshes]
     sides = [sum(1 for _ in mesh.Boundaries("rim").Elements()) for mesh in meshes]
     orders = np.diff(np.log(errors)) / -np.diff(np.log(sides))
-    assert min(orders) > 2.9
+    assert min(orders) > 3.9
 
 
 # -- grading -----------------------------------------------------------------------------------------------------------
@@ -331,10 +330,11 @@ def test_vtk_reads_back(kind, tmp_path):
     data = meshio.read(files[-1])
     fields = data.point_data
     assert all(np.isfinite(values).all() for values in fields.values())
-    assert fields["J"] == pytest.approx(state.J, rel=1e-6)  # VTK values are single precision where NGSolve says so
-    assert fields["p"] == pytest.approx(state.p, rel=1e-6)
+    # Written in double precision: what is left is the relaxation still to come.
+    assert fields["J"] == pytest.approx(state.J, rel=1e-9)
+    assert fields["p"] == pytest.approx(state.p, rel=1e-9)
     stretch = state.J ** (1 / (2 if kind == "plane strain" else 3))
-    assert fields["displacement"] == pytest.approx((stretch - 1) * data.points, abs=1e-6)
+    assert fields["displacement"] == pytest.approx((stretch - 1) * data.points, abs=1e-9)
     assert data.points[:, 2].max() == (3.0 if kind == "3-d" else 0.0)
 
 
@@ -510,7 +510,6 @@ def test_gmsh_file_of_another_program(tmp_path):
     assert Integrate(CF(1.0), got, definedon=got.Boundaries("rest")) == pytest.approx(3.0, rel=1e-12)
 
 
-def test_netgen_is_not_asked_to_hold_more_than_the_body(tmp_path):
+def test_stray_nodes_are_left_out(tmp_path):
     # Nodes of no cell would be vertices without an equation.
     assert read_mesh(gmsh_2d(tmp_path / "a.msh", "quad")).nv == 6
-    assert isinstance(read_mesh(tmp_path / "a.msh").ngmesh, netgen.Mesh)
