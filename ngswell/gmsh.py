@@ -166,6 +166,9 @@ def _parse(what: str, path: Path) -> _File:
         nodes, cells = _READERS[version](sections)
     except (KeyError, IndexError, ValueError, StopIteration) as error:
         raise InputError(f"{what}: the file is cut short or not well formed ({error}); {remedy}") from error
+    missing = {node for group in cells.values() for cell in group for node in cell} - set(nodes)
+    if missing:
+        raise InputError(f"{what}: cells refer to node {min(missing)}, which the file does not hold")
     curved = {kind for kind, _ in cells if kind not in _DIMENSION}
     if curved:
         raise InputError(f"{what}: cells of Gmsh's type {sorted(curved)} are not straight; {remedy}")

@@ -474,6 +474,7 @@ def test_thin_cells_are_sound():
         (lambda text: text.replace("1 1 2 1 1 1 2", "1 1 2 1 1 1 6"), "'bottom' near .* no side"),
         (lambda text: text.replace("2 1 2 1 1 2 3", "2 1 2 1 1 2 1"), "two physical groups"),
         (lambda text: text.replace("5 1 1 0", "5 1 1 0.5"), "z = 0.5 mm"),
+        (lambda text: text.replace("2 1 2 1 1 2 3", "2 1 2 1 1 2 9"), "node 9"),
         (lambda text: text.replace("5 1 1 0", "5 2.5 -0.5 0"), "turned inside out"),
     ],
 )
