@@ -1,4 +1,4 @@
-"""The linearised triphasic column and the uniform gel between two baths, in closed form. Derivation: docs/section_linear.md.
+"""The linearised triphasic column and the uniform gel between two baths, in closed form. Derivation: docs/linear_column.md.
 
 About the charged, stress-free reference state in equilibrium with a bath c̄, in the potentials that are continuous across
 the boundary (differences to that state, Rθ in N/mm² per mol/l):

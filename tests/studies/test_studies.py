@@ -73,8 +73,34 @@ def test_free_swelling(tmp_path):
         errors = abs(numbers[f"{key}_mesh_error"]) + abs(numbers[f"{key}_step_error"])
         assert abs(numbers[key] - value) < 2 * errors + 1e-3
         assert errors < 0.03
-    assert numbers["fluid_imbalance"] < 1e-9
-    assert numbers["cation_imbalance"] < 1e-9
+    assert numbers["fluid_imbalance"] < 1e-10
+    assert numbers["cation_imbalance"] < 1e-10
+
+
+def test_cylinder(tmp_path):
+    numbers, _ = quick("cylinder", tmp_path)
+    for body in ("disc", "block"):
+        # Homogeneous states lie in every space: Newton's tolerance, and what is left of the relaxation at 1e6 s.
+        assert numbers[f"{body}_initial_J"] == pytest.approx(numbers["closed_form_initial_J"], rel=1e-9)
+        closed = numbers["closed_form_volume_ratio_equilibrium"]
+        assert numbers[f"{body}_volume_ratio_equilibrium"] == pytest.approx(closed, rel=1e-6)
+        assert numbers[f"{body}_core_J_min"] < numbers[f"{body}_initial_J"] - 0.2  # negative osmosis
+        assert numbers[f"{body}_fluid_imbalance"] < 1e-10
+    assert numbers["disc_equilibrate_error"] < 1e-9
+    # All faces at once: the block is ahead of the disc, whose bottom waits.
+    assert numbers["block_volume_ratio_11000"] > numbers["disc_volume_ratio_11000"] > 2
+
+
+def test_verification(tmp_path):
+    numbers, _ = quick("verification", tmp_path)
+    assert numbers["homogeneous_error"] < 1e-8  # Newton's tolerance
+    assert numbers["terzaghi_error"] < 1e-4  # Δt³ of the extrapolation
+    assert numbers["cryer_error"] < 1e-3
+    assert numbers["cryer_overshoot"] == pytest.approx(numbers["cryer_overshoot_series"], abs=1e-3)
+    assert numbers["linear_column_error"] < 2e-7  # the penalty's bias
+    assert numbers["donnan_order_2"] == pytest.approx(2, abs=0.1)
+    assert numbers["donnan_order_3"] == pytest.approx(3, abs=0.1)
+    assert abs(numbers["donnan_printed_drive"]) < 0.1
 
 
 def test_output_is_refused_before_computing(tmp_path, capsys):

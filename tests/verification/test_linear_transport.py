@@ -1,4 +1,4 @@
-"""Coupled transport of fluid and ions against the closed forms of `ngswell.linear`, derived in docs/section_linear.md."""
+"""Coupled transport of fluid and ions against the closed forms of `ngswell.linear`, derived in docs/linear_column.md."""
 
 from dataclasses import replace
 from functools import cached_property
