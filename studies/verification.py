@@ -48,8 +48,10 @@ from ngswell import (
     series,
 )
 from ngswell.analytic import homogeneous_equilibrium
+from ngswell.kinematics import Kinematics
 from ngswell.linear import LinearColumn
 from ngswell.models import Model
+from ngswell.supports import Support
 from studies.output import Findings, cost
 
 # -- homogeneous equilibria --------------------------------------------------------------------------------------------
@@ -62,11 +64,12 @@ def gel(cfc0: float) -> Material:
 
 def homogeneous_body(motion: str, cfc0: float, bath: float, model: Model | None = None) -> Scene:
     """A body of one cell (two in the column) with free sides in a bath."""
-    mesh, kinematics, supports, wet = {
+    bodies: dict[str, tuple[Mesh, Kinematics, list[Support], str]] = {
         "confined": (column(1.0, 2), Confined(), [Roller("bottom", "x")], "top"),
         "plane strain": (rectangle(1, 1, 1, 1), PlaneStrain(), [Symmetry("left"), Symmetry("bottom")], "top|right"),
         "3-d": (box(1, 1, 1, 1, 1, 1), Solid(), [Symmetry(s) for s in ("left", "front", "bottom")], "right|back|top"),
-    }[motion]
+    }
+    mesh, kinematics, supports, wet = bodies[motion]
     return Scene(
         mesh=mesh,
         kinematics=kinematics,
