@@ -38,7 +38,10 @@ _TURNED = {
 }
 """The corners of the same cell, turned over; Gmsh's straight cells by meshio's names."""
 
-_REMEDY = "in Gmsh, set Mesh.MshFileVersion = 4.1, Mesh.ElementOrder = 1, Mesh.SaveAll = 0 and save again"
+_REMEDY = (
+    "in Gmsh, set Mesh.MshFileVersion = 4.1, Mesh.ElementOrder = 1, Mesh.SaveAll = 0 (only cells in physical groups), "
+    "Mesh.SaveParametric = 0 and save again"
+)
 
 Groups = dict[tuple[int, str, str], NDArray]
 """(dimension, shape, name of the physical group) → corners of its cells, one row each."""
@@ -60,7 +63,7 @@ def read_mesh(path: str | Path) -> Mesh:
         (name for cell_dim, _, name in groups if cell_dim == dim - 1),
         "give them Physical " + ("Curve" if dim == 2 else "Surface") + '("name") in Gmsh, and one to the body',
     )
-    _check_single(what, groups)
+    _check_single(what, groups, points)
     sides = {key: cells for key, cells in groups.items() if key[0] == dim - 1 and key[2]}
     body = {key: cells for key, cells in groups.items() if key[0] == dim}
     used = np.unique(np.concatenate([cells.ravel() for cells in body.values()]))
@@ -89,14 +92,14 @@ def read_mesh(path: str | Path) -> Mesh:
     return result
 
 
-def _check_single(what: str, groups: Groups) -> None:
+def _check_single(what: str, groups: Groups, points: NDArray) -> None:
     """Refuse a cell that stands in two physical groups: it would be counted twice."""
     for shape in {key[1] for key in groups}:
         cells = np.concatenate([cells for key, cells in groups.items() if key[1] == shape])
         different, times = np.unique(np.sort(cells), axis=0, return_counts=True)
         if times.max() > 1:
-            nodes = (different[times.argmax()] + 1).tolist()
-            raise InputError(f"{what}: the {shape} of nodes {nodes} is in two physical groups; put each into one")
+            place = ", ".join(f"{x:.4g}" for x in points[different[times.argmax()]].mean(axis=0))
+            raise InputError(f"{what}: the {shape} near ({place}) mm is in two physical groups; put each into one")
 
 
 def _inside(sides: Groups, body: Groups, points: NDArray) -> dict[tuple[int, ...], NDArray]:
