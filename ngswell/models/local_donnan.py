@@ -16,6 +16,7 @@ from ngswell.kinematics import Kinematics
 from ngswell.materials import Field, Material
 from ngswell.models.mechanics import SolidState
 from ngswell.models.terms import Term, check_order
+from ngswell.schedules import Blend
 from ngswell.supports import Weight
 
 
@@ -69,7 +70,10 @@ class State(SolidState):
 
 @dataclass(frozen=True)
 class LocalDonnan:
-    """Unknowns u (order k) and hydraulic pressure P (order k − 1); the limit of fast ion diffusion in the full model."""
+    """Unknowns u (order k) and hydraulic pressure P (order k − 1); the limit of fast ion diffusion in the full model.
+
+    The ions follow the bath at once, at the start too: a bath that differs from the scene's `initial` is a sudden change.
+    """
 
     order: int = 2
 
@@ -88,6 +92,12 @@ class LocalDonnan:
     def check(self, material: Material, baths: Sequence[Bath]) -> None:
         if not baths or any(bath.c is None for bath in baths):
             raise InputError("LocalDonnan needs a bath with its salt concentration c [mol/l]")
+        for bath in baths:
+            if isinstance(bath.concentration, Blend):
+                raise InputError(
+                    f"bath on {bath.boundary!r}: its concentration varies in space, but LocalDonnan has the ions in "
+                    "equilibrium with one bath; use Concentration"
+                )
         for bath in baths[1:]:
             if bath.concentration != baths[0].concentration:
                 raise InputError(

@@ -52,7 +52,9 @@ class Uncharged:
 
     def check(self, material: Material, baths: Sequence[Bath]) -> None:
         if not isinstance(material.cfc0, (int, float)) or material.cfc0 != 0:
-            raise InputError("Uncharged: the material has cfc0 other than 0; use Concentration or LocalDonnan")
+            value = f"{material.cfc0:g}" if isinstance(material.cfc0, (int, float)) else "a field"
+            remedy = "use Concentration or LocalDonnan"
+            raise InputError(f"Uncharged: the material has cfc0 other than 0 ({value}, mol/l); {remedy}")
         for bath in baths:
             if bath.c is not None:
                 raise InputError(f"bath on {bath.boundary!r}: Uncharged has no ions, so it takes no concentration c")
