@@ -1,0 +1,292 @@
+"""Manufactured solutions: chosen fields, and the sources under which they solve the system.
+
+Everything here is written from the equations in the current configuration, with tensors of three dimensions throughout, and
+shares no function with ngswell:
+
+    P  = (τ − J p I) F⁻ᵀ,   τ = µ (B − I) + λ (1 − nS0)² [J/(1 − nS0) − J/(J − nS0)] I                  (16), (18)
+    nF wF    = −K (grad p + cfc grad E),   nF c₊ w₊ = −nF D₊ (grad c + c grad E/Rθ) + c nF wF           (19), (20)
+    grad E   = −Rθ/Θ [D_L/Rθ grad p − (D₋ − D₊) grad c + D₋ grad cfc],   cfc = (1 − nS0) cfc0/(J − nS0)   (13), (22)
+    body force −Div P,   fluid source ∂J/∂t + Div W,   cation source ∂[(J − nS0) c]/∂t + Div J₊,   W = J F⁻¹ nF wF, ...
+
+    bath     q̄ = ε (p − p_D), j̄ = ε (c − c_D) per current area J |F⁻ᵀ N|,
+    c_D = sqrt(c̄² + cfc²/4) + cfc/2,   p_D = 2 Rθ [sqrt(c̄² + cfc²/4) − c̄]                                (23), (38)
+
+Divergences are taken in the strong form, by differentiating the chosen fields, and every boundary gets the normal traction
+and normal fluxes as well. A source in the weak form, ∫ W · Grad q, would repeat the model's integration by parts, and no
+error in a measure of volume (2πr) or in the gradient of a test function could show.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from math import pi
+from typing import NamedTuple
+
+from ngsolve import (
+    CF,
+    CoefficientFunction,
+    Det,
+    Grad,
+    GridFunction,
+    Id,
+    InnerProduct,
+    Integrate,
+    Inv,
+    Parameter,
+    grad,
+    specialcf,
+    sqrt,
+    x,
+    y,
+    z,
+)
+
+from ngswell import Concentration
+from ngswell.models.concentration import State
+from ngswell.models.terms import Term
+from ngswell.problem import Problem
+
+
+class Chosen(NamedTuple):
+    """The fields at one time: displacement components [mm], p [N/mm²], c [mol/l]."""
+
+    u: tuple[CoefficientFunction, ...]
+    p: CoefficientFunction
+    c: CoefficientFunction
+
+
+@dataclass(frozen=True)
+class Cartesian:
+    """Coordinates x, y(, z); in the plane nothing depends on z."""
+
+    dimension: int
+    measure = CF(1.0)
+
+    def gradient(self, f: CoefficientFunction) -> CoefficientFunction:
+        """Gradient of a scalar, three components."""
+        return CF(tuple(f.Diff(s) for s in (x, y, z)[: self.dimension]) + (0.0,) * (3 - self.dimension))
+
+    def vector_gradient(self, u: Sequence[CoefficientFunction]) -> CoefficientFunction:
+        """Grad u, 3 × 3."""
+        rows = [self.gradient(component) for component in u] + [CF((0.0, 0.0, 0.0))] * (3 - self.dimension)
+        return CF(tuple(rows), dims=(3, 3))
+
+    def divergence(self, w: CoefficientFunction) -> CoefficientFunction:
+        return sum((w[j].Diff(s) for j, s in enumerate((x, y, z)[: self.dimension])), CF(0.0))
+
+    def tensor_divergence(self, P: CoefficientFunction) -> CoefficientFunction:
+        """Div P, one component a displacement."""
+        return CF(tuple(self.divergence(CF((P[i, 0], P[i, 1], P[i, 2]))) for i in range(self.dimension)))
+
+    def normal(self) -> CoefficientFunction:
+        n = specialcf.normal(self.dimension)
+        return CF(tuple(n[j] for j in range(self.dimension)) + (0.0,) * (3 - self.dimension))
+
+    def discrete_gradient(self, u: GridFunction) -> CoefficientFunction:
+        g, d = Grad(u), self.dimension
+        return CF(tuple(g[i, j] if i < d and j < d else 0.0 for i in range(3) for j in range(3)), dims=(3, 3))
+
+
+@dataclass(frozen=True)
+class Cylindrical(Cartesian):
+    """Coordinates r, z (the mesh's x and y), third the hoop direction."""
+
+    dimension: int = 2
+    measure = 2 * pi * x
+
+    def vector_gradient(self, u: Sequence[CoefficientFunction]) -> CoefficientFunction:
+        (u_r, u_z), zero = u, CF(0.0)
+        return CF((u_r.Diff(x), u_r.Diff(y), zero, u_z.Diff(x), u_z.Diff(y), zero, zero, zero, u_r / x), dims=(3, 3))
+
+    def divergence(self, w: CoefficientFunction) -> CoefficientFunction:
+        return w[0].Diff(x) + w[0] / x + w[1].Diff(y)
+
+    def tensor_divergence(self, P: CoefficientFunction) -> CoefficientFunction:
+        along_r = P[0, 0].Diff(x) + P[0, 1].Diff(y) + (P[0, 0] - P[2, 2]) / x
+        along_z = P[1, 0].Diff(x) + P[1, 1].Diff(y) + P[1, 0] / x
+        return CF((along_r, along_z))
+
+    def discrete_gradient(self, u: GridFunction) -> CoefficientFunction:
+        g = Grad(u)
+        return CF((g[0, 0], g[0, 1], 0.0, g[1, 0], g[1, 1], 0.0, 0.0, 0.0, u[0] / x), dims=(3, 3))
+
+
+@dataclass(frozen=True)
+class Parameters:
+    """The material as plain numbers, µ, λ [N/mm²], K [mm⁴/(N s)], D± [mm²/s], cfc0 [mol/l], Rθ [N/mm² per mol/l]."""
+
+    mu: float
+    lam: float
+    nS0: float
+    cfc0: float
+    D_plus: float
+    D_minus: float
+    K: float
+    RT: float
+
+
+class Exact:
+    """What the chosen fields amount to at one time: stress, contents and fluxes on the reference configuration."""
+
+    def __init__(self, chosen: Chosen, coordinates: Cartesian, parameters: Parameters) -> None:
+        self.chosen, self.coordinates, self.m = chosen, coordinates, parameters
+
+    @cached_property
+    def displacement_gradient(self) -> CoefficientFunction:
+        return self.coordinates.vector_gradient(self.chosen.u)
+
+    @cached_property
+    def F(self) -> CoefficientFunction:
+        return Id(3) + self.displacement_gradient
+
+    @cached_property
+    def J(self) -> CoefficientFunction:
+        return Det(self.F)
+
+    @cached_property
+    def cfc(self) -> CoefficientFunction:
+        m = self.m
+        return (1 - m.nS0) * m.cfc0 / (self.J - m.nS0)
+
+    @cached_property
+    def stress(self) -> CoefficientFunction:
+        """First Piola-Kirchhoff stress P [N/mm²]."""
+        m, J = self.m, self.J
+        B = self.F * self.F.trans
+        volumetric = m.lam * (1 - m.nS0) ** 2 * (J / (1 - m.nS0) - J / (J - m.nS0))
+        return (m.mu * (B - Id(3)) + (volumetric - J * self.chosen.p) * Id(3)) * Inv(self.F).trans
+
+    @cached_property
+    def fluxes(self) -> tuple[CoefficientFunction, CoefficientFunction]:
+        """W [mm/s] and J₊ [mol/l mm/s]."""
+        m, J, c, cfc = self.m, self.J, self.chosen.c, self.cfc
+        inverse = Inv(self.F)
+        grad_p, grad_c, grad_cfc = (inverse.trans * self.coordinates.gradient(f) for f in (self.chosen.p, c, cfc))
+        nF = 1 - m.nS0 / J
+        D_L = cfc * m.K * m.RT / nF
+        theta = m.D_plus * c + m.D_minus * (c - cfc) + D_L * cfc
+        grad_E = -m.RT / theta * (D_L / m.RT * grad_p - (m.D_minus - m.D_plus) * grad_c + m.D_minus * grad_cfc)
+        water = -m.K * (grad_p + cfc * grad_E)
+        cations = -nF * m.D_plus * (grad_c + c / m.RT * grad_E) + c * water
+        return J * inverse * water, J * inverse * cations
+
+    @cached_property
+    def contents(self) -> tuple[CoefficientFunction, CoefficientFunction]:
+        """Fluid [-] and cations [mol/l] per reference volume."""
+        content = self.J - self.m.nS0
+        return content, content * self.chosen.c
+
+    def bath_efflux(self, bath: WeakBath) -> tuple[CoefficientFunction, CoefficientFunction]:
+        """What the weak condition lets out per reference area: fluid [mm/s], cations [mol/l mm/s]."""
+        root = sqrt(bath.c**2 + self.cfc**2 / 4)
+        push = Inv(self.F).trans * self.coordinates.normal()
+        area = self.J * sqrt(InnerProduct(push, push))
+        p_D, c_D = 2 * self.m.RT * (root - bath.c), root + self.cfc / 2
+        return bath.epsilon * area * (self.chosen.p - p_D), bath.epsilon * area * (self.chosen.c - c_D)
+
+
+class WeakBath(NamedTuple):
+    """A bath of the scene: its boundary, salt concentration [mol/l] and ε [mm³/(N s) for p, mm/s for c]."""
+
+    boundary: str
+    c: float
+    epsilon: float
+
+
+@dataclass(frozen=True)
+class Clock:
+    """The times of the present step, in the sources [s]."""
+
+    now: Parameter = field(default_factory=lambda: Parameter(0.0))
+    before: Parameter = field(default_factory=lambda: Parameter(-1.0))
+
+    def follow(self, problem: Problem) -> None:
+        """Move with every step that `problem` begins."""
+        begin_step = problem.begin_step
+
+        def moved(time: float, dt: float, guess: object = None) -> None:
+            self.now.Set(time)
+            self.before.Set(time - dt)
+            begin_step(time, dt, guess)
+
+        problem.begin_step = moved
+
+
+@dataclass(frozen=True)
+class Case:
+    """Fields chosen over time in their coordinates, the boundaries with area, and the bath if there is one."""
+
+    chosen: Callable[[CoefficientFunction], Chosen]
+    coordinates: Cartesian
+    parameters: Parameters
+    boundaries: str
+    bath: WeakBath | None = None
+    true_rate: bool = False
+    """The sources hold the time derivative of the contents; else the difference quotient, so that time adds no error."""
+    clock: Clock = field(default_factory=Clock)
+
+    def at(self, time: CoefficientFunction) -> Exact:
+        return Exact(self.chosen(time), self.coordinates, self.parameters)
+
+    def rates(self) -> list[CoefficientFunction]:
+        now, before = self.clock.now, self.clock.before
+        if self.true_rate:
+            return [content.Diff(now) for content in self.at(now).contents]
+        pairs = zip(self.at(now).contents, self.at(before).contents, strict=True)
+        return [(new - old) / (now - before) for new, old in pairs]
+
+    def sources(self, tests: Sequence[CoefficientFunction]) -> list[Term]:
+        """Terms that turn the residual's zero into the chosen fields."""
+        v, q, d, _ = tests
+        exact, at = self.at(self.clock.now), self.coordinates
+        normal, dimension = at.normal(), at.dimension
+        traction = exact.stress * normal
+        held = CF(tuple(traction[i] for i in range(dimension)))
+        terms = [
+            Term("momentum", "body force", InnerProduct(at.tensor_divergence(exact.stress), v)),
+            Term("momentum", "traction", -InnerProduct(held, v), boundary=self.boundaries),
+        ]
+        for balance, test, rate, flux in zip(("fluid", "cations"), (q, d), self.rates(), exact.fluxes, strict=True):
+            terms.append(Term(balance, "source", -(rate + at.divergence(flux)) * test))
+            terms.append(Term(balance, "outflow", InnerProduct(flux, normal) * test, boundary=self.boundaries))
+        if self.bath is not None:
+            for balance, test, efflux in zip(("fluid", "cations"), (q, d), exact.bath_efflux(self.bath), strict=True):
+                terms.append(Term(balance, "outflow to the bath", -efflux * test, boundary=self.bath.boundary))
+        return terms
+
+    def errors(self, problem: Problem) -> dict[str, float]:
+        """L2 norms over the body of what the fields of `problem` are off at the clock's time, and of their gradients."""
+        exact, at = self.at(self.clock.now), self.coordinates
+        u, p, c, cfc = problem.fields.components
+        chosen = exact.chosen
+        differences = {
+            "u": u - CF(chosen.u),
+            "p": p - chosen.p,
+            "c": c - chosen.c,
+            "cfc": cfc - exact.cfc,
+            "grad u": at.discrete_gradient(u) - exact.displacement_gradient,
+            "grad p": _padded(grad(p)) - at.gradient(chosen.p),
+            "grad c": _padded(grad(c)) - at.gradient(chosen.c),
+        }
+        # Squares of errors of degree k and of smooth fields: three orders more than the square of the displacement.
+        order = 2 * problem.model.order + 3
+        return {
+            name: Integrate((InnerProduct(e, e) * at.measure).Compile(), problem.mesh, order=order) ** 0.5
+            for name, e in differences.items()
+        }
+
+
+def _padded(g: CoefficientFunction) -> CoefficientFunction:
+    return CF(tuple(g[i] for i in range(g.dim)) + (0.0,) * (3 - g.dim))
+
+
+@dataclass(frozen=True)
+class Manufactured(Concentration):
+    """The model under test, driven by the sources of a case."""
+
+    case: Case | None = None
+
+    def terms(self, state: State, tests: Sequence[CoefficientFunction]) -> list[Term]:
+        return super().terms(state, tests) + self.case.sources(tests)
