@@ -17,6 +17,7 @@ from __future__ import annotations
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
 from netgen.occ import Circle, MoveTo, OCCGeometry
 from ngsolve import Integrate, Mesh, x, y
 from numpy.typing import NDArray
@@ -52,6 +53,7 @@ from ngswell.kinematics import Kinematics
 from ngswell.linear import LinearColumn
 from ngswell.models import Model
 from ngswell.supports import Support
+from studies.manufactured import FAST, SLOW, errors, orders
 from studies.output import Findings, cost
 
 # -- homogeneous equilibria --------------------------------------------------------------------------------------------
@@ -87,17 +89,16 @@ def homogeneous(ax: Axes, quick: bool) -> dict[str, float]:
     for motion, style in (("confined", ":"), ("plane strain", "--"), ("3-d", "-")):
         for cfc0 in (0.2, 1.0):
             closed = [homogeneous_equilibrium(gel(cfc0), float(c), motion).J for c in lines]
-            ax.loglog(lines, closed, "k" + style, lw=1, label=motion if cfc0 == 1.0 else None)
+            shade = "k" if cfc0 == 1.0 else "0.55"
+            ax.loglog(lines, closed, color=shade, ls=style, lw=1, label=motion if cfc0 == 1.0 else None)
             for c in dots:
                 scene = homogeneous_body(motion, cfc0, float(c))
                 scene.problem.restore(scene.equilibrate())
                 J = scene.problem.state.J(scene.mesh(*(0.5,) * scene.mesh.dim))
-                ax.plot(c, J, "ko", ms=2.5)
+                ax.plot(c, J, "o", color=shade, ms=2.5)
                 largest = max(largest, abs(J / homogeneous_equilibrium(gel(cfc0), float(c), motion).J - 1))
-    ax.set(xlabel="bath [mol/l]", ylabel="J at rest", title="homogeneous swelling")
-    ax.legend(loc="upper right")
-    ax.annotate("charge 1 mol/l", (1e-5, 3.1), fontsize=7)
-    ax.annotate("0.2 mol/l", (1e-5, 1.15), fontsize=7)
+    ax.set(xlabel="bath [mol/l]", ylabel="J at rest", title="homogeneous swelling", ylim=(0.9, 400))
+    ax.legend(loc="upper right", title="charge 1 mol/l, grey 0.2 mol/l", title_fontsize=8)
     return {"homogeneous_error": largest}
 
 
@@ -271,7 +272,41 @@ def donnan_rest(ax: Axes) -> dict[str, float]:
     ax.loglog(1 / cells, wrong[:, 1], "k^:", ms=3, lw=0.8, label="(19) as printed")
     numbers["donnan_printed_drive"] = float(np.log2(wrong[1, 1] / wrong[2, 1]))
     ax.set(xlabel="cell size [mm]", ylabel="|P − P$_{bath}$| / Rθ [mol/l]", title="layered gel at rest")
-    ax.legend()
+    ax.set_xticks(1 / cells, [f"1/{n}" for n in cells])
+    ax.minorticks_off()
+    ax.legend(loc="center right", bbox_to_anchor=(1.0, 0.66))
+    return numbers
+
+
+# -- chosen solutions of the full system -------------------------------------------------------------------------------
+
+
+def manufactured(ax: Axes) -> dict[str, float]:
+    """L2 errors of u and p against chosen fields: quadratic u in a fast motion, cubic u in a slow one."""
+    numbers = {}
+    for kind, style in (("plane strain", "-"), ("axisymmetric", "--"), ("3-d", ":")):
+        for order, duration, shade in ((2, FAST, "k"), (3, SLOW, "0.55")):
+            cells = (6, 12) if kind != "3-d" else (2, 4) if order == 2 else (2, 3)
+            pair = [errors(kind, order, n, duration) for n in cells]
+            for name, marker in (("u", "o"), ("p", "s")):
+                sizes = [1 / n for n in cells]
+                label = f"{name}, {kind}, order {order}"
+                ax.loglog(sizes, [e[name] for e in pair], marker=marker, ls=style, color=shade, ms=3, lw=0.8, label=label)
+            for name, order_of in orders(pair[0], pair[1], cells[1] / cells[0]).items():
+                if name in ("u", "p", "c"):
+                    numbers[f"manufactured_{kind.replace(' ', '_').replace('-', '')}_order_{order}_{name}"] = order_of
+    ax.set(xlabel="cell size [mm]", ylabel="L2 error of u, p (mm, N)", title="chosen solutions")
+    ax.set_xticks([1 / 12, 1 / 6, 1 / 4, 1 / 2], ["1/12", "1/6", "1/4", "1/2"])
+    ax.minorticks_off()
+    ax.legend(
+        handles=[
+            Line2D([], [], color="k", marker="o", ms=3, ls="", label="u"),
+            Line2D([], [], color="k", marker="s", ms=3, ls="", label="p"),
+            Line2D([], [], color="k", label="order 2"),
+            Line2D([], [], color="0.55", label="order 3"),
+        ],
+        ncols=2,
+    )
     return numbers
 
 
@@ -288,6 +323,7 @@ def run(quick: bool = False) -> Findings:
     numbers |= cryer(axes[0, 2], results)
     numbers |= linear_column(axes[1, 0], results)
     numbers |= donnan_rest(axes[1, 1])
+    numbers |= manufactured(axes[1, 2])
     numbers |= {"mesh": "1 to 256 cells of order 2 to 4, by case", **cost(results)}
     rows = [
         (case, line.get_label(), float(a), float(b))

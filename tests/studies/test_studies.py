@@ -101,6 +101,10 @@ def test_verification(tmp_path):
     assert numbers["donnan_order_2"] == pytest.approx(2, abs=0.1)
     assert numbers["donnan_order_3"] == pytest.approx(3, abs=0.1)
     assert abs(numbers["donnan_printed_drive"]) < 0.1
+    for key in (k for k in numbers if k.startswith("manufactured_")):
+        order, name = int(key[-3]), key[-1]
+        # Orders k + 1 of u and k of p and c; 0.25 on the coarse meshes in space (2 and 3 cells a side).
+        assert numbers[key] > order + (name == "u") - (0.25 if "_3d_order_3" in key else 0.15), key
 
 
 def test_output_is_refused_before_computing(tmp_path, capsys):

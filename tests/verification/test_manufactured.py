@@ -1,128 +1,32 @@
 """Observed orders of the whole nonlinear system against manufactured solutions, in space, in time and for every kinematics.
 
-`manufactured.py` has the equations a second time, and the sources. Each claim has a control: with a term taken out of the
-model, or put in wrongly, the order is gone.
+`studies/manufactured.py` has the equations a second time, and the sources. Each claim has a control: with a term taken
+out of the model, or put in wrongly, the order is gone.
 """
-
-from math import sqrt
 
 import numpy as np
 import pytest
-from manufactured import Cartesian, Case, Chosen, Cylindrical, Exact, Manufactured, Parameters, WeakBath
-from ngsolve import CF, cos, sin, x, y, z
-from ngsolve.meshes import MakeStructured2DMesh, MakeStructured3DMesh
+from ngsolve import CF
 
-from ngswell import Axisymmetric, Bath, Fixed, Material, Penalty, Pin, PlaneStrain, Roller, Scene, Solid, laws, rectangle
+from ngswell import Axisymmetric, PlaneStrain, Solid, laws
 from ngswell import kinematics as motions
 from ngswell.quadrature import points
-
-# As stiff as that, the body stays stable under the tractions, which do not follow the surface (at µ = 0.3 the ring buckles).
-NUMBERS = {"mu": 0.6, "lam": 0.1, "nS0": 0.25, "cfc0": 0.4, "D_plus": 5e-4, "D_minus": 8e-4, "K": 1.07e-3}
-RT = 8.3144e-3 * 298
-SALT = 1.0
-P_START = 2 * RT * (sqrt(SALT**2 + NUMBERS["cfc0"] ** 2 / 4) - SALT)
-C_START = sqrt(SALT**2 + NUMBERS["cfc0"] ** 2 / 4) + NUMBERS["cfc0"] / 2
-"""All fields start from u = 0 in Donnan equilibrium with 1 mol/l, as scenes do: exactly, in every space."""
-
-SLOW, FAST = 1000.0, 1.0
-"""Duration of the motion [s]. In 1000 s fluid and ions diffuse across the body's millimetre, in 1 s hardly across a cell."""
-
-# What holds the body where the chosen displacement vanishes, and the boundaries that have area.
-FLAT = [Roller("left", "x"), Roller("bottom", "y")]
-CYLINDER = [Roller("left", "r"), Roller("bottom", "z")]
-RING = [Roller("bottom", "z")]
-BLOCK = [Roller("back", "x"), Roller("left", "y"), Roller("bottom", "z")]
-AROUND, WITHOUT_AXIS, SIX = "bottom|right|top|left", "bottom|right|top", "back|left|front|right|bottom|top"
-
-
-def ring(n):
-    return MakeStructured2DMesh(quads=True, nx=n, ny=n, mapping=lambda s, t: (0.5 + s, t))
-
-
-def square(n):
-    return rectangle(1.0, 1.0, n, n)
-
-
-def cube(n):
-    return MakeStructured3DMesh(hexes=True, nx=n, ny=n, nz=n)
-
-
-KINDS = {
-    "plane strain": (square, PlaneStrain(), Cartesian(2), FLAT, AROUND),
-    "axisymmetric": (square, Axisymmetric(), Cylindrical(), CYLINDER, WITHOUT_AXIS),
-    "ring": (ring, Axisymmetric(), Cylindrical(), RING, AROUND),
-    "3-d": (cube, Solid(), Cartesian(3), BLOCK, SIX),
-}
-
-
-def smooth(kind, duration):
-    """Fields that no polynomial space holds. u is odd and p, c are even in x, as on the axis of a cylinder they must be."""
-
-    def chosen(time):
-        a = sin(time / duration) / np.sin(1.0)
-        if kind == "3-d":
-            return Chosen(
-                (0.12 * a * sin(x) * cos(y) * cos(z / 2), 0.1 * a * sin(y) * cos(x), 0.15 * a * sin(z) * cos(x - y)),
-                P_START + 0.05 * a * cos(x) * sin(1 + 2 * y) * cos(z),
-                C_START + 0.2 * a * cos(1.5 * x) * sin(0.5 + y + z / 2),
-            )
-        return Chosen(
-            (0.16 * a * sin(x) * cos(y / 2), 0.12 * a * sin(y) * cos(x)),
-            P_START + 0.05 * a * cos(x) * sin(1 + 2 * y),
-            C_START + 0.2 * a * cos(1.5 * x) * sin(0.5 + y),
-        )
-
-    return chosen
-
-
-def affine(kind, duration):
-    """Fields that every space holds, so that no error but that of the time remains."""
-
-    def chosen(time):
-        a = sin(time / duration) / np.sin(1.0)
-        p, c = P_START + a * (0.05 * x - 0.03 * y), C_START + a * (0.1 * x + 0.15 * y)
-        if kind == "3-d":
-            u = (a * (0.15 * x + 0.06 * y - 0.05 * z), a * (0.1 * y + 0.07 * z), 0.12 * a * z)
-            return Chosen(u, p + 0.02 * a * z, c - 0.05 * a * z)
-        shear = 0.0 if kind == "ring" else 0.08
-        return Chosen((a * (0.15 * x + shear * y), 0.1 * a * y), p, c)
-
-    return chosen
-
-
-PINS = {
-    "plane strain": [Pin((0.0, 0.0), "xy"), Pin((1.0, 0.0), "y")],
-    "ring": RING,
-    "3-d": [Pin((0.0, 0.0, 0.0), "xyz"), Pin((1.0, 0.0, 0.0), "yz"), Pin((0.0, 1.0, 0.0), "z")],
-}
-
-
-BATH = WeakBath("top", SALT, 0.01)
-"""Weak enough that neither p nor c is as good as prescribed: the condition itself is tested."""
-
-
-def errors(kind, order, cells, duration, steps=2, fields=smooth, bath=None, model=Manufactured, true_rate=False):
-    """Error norms at the end of the motion."""
-    make_mesh, motion, coordinates, supports, boundaries = KINDS[kind]
-    case = Case(fields(kind, duration), coordinates, Parameters(**NUMBERS, RT=RT), boundaries, bath, true_rate)
-    scene = Scene(
-        mesh=make_mesh(cells),
-        kinematics=motion,
-        material=Material(**NUMBERS),
-        model=model(order=order, case=case),
-        supports=supports if fields is smooth else PINS[kind],
-        baths=[Bath(bath.boundary, c=bath.c, treatment=Penalty(bath.epsilon))] if bath else [],
-        initial=(SALT, 0.0),
-    )
-    case.clock.follow(scene.problem)
-    scene.run(duration, Fixed(duration / steps))
-    return case.errors(scene.problem)
-
-
-def orders(coarse, fine, ratio):
-    """Observed orders between two meshes or steps whose sizes have this ratio."""
-    return {name: float(np.log(coarse[name] / fine[name]) / np.log(ratio)) for name in fine}
-
+from studies.manufactured import (
+    BATH,
+    FAST,
+    KINDS,
+    NUMBERS,
+    PINS,
+    RT,
+    SLOW,
+    Exact,
+    Manufactured,
+    Parameters,
+    affine,
+    errors,
+    orders,
+    smooth,
+)
 
 # -- in space ----------------------------------------------------------------------------------------------------------
 
