@@ -167,6 +167,11 @@ class Material:
         """Rθ [N/mm² per mol/l]."""
         return GAS_CONSTANT * self.theta
 
+    def laws(self) -> dict[str, object]:
+        """The constitutive choices that are not the paper's, by name."""
+        names = ("permeability", "diffusivity", "phi", "phi_bath", "Gamma")
+        return {name: getattr(self, name) for name in names if getattr(self, name) not in (Constant(), 1.0)}
+
     def check_on(self, mesh: Mesh) -> None:
         """Refuse fields of position whose values, at the quadrature points of `mesh`, are out of range."""
         where = points(mesh, VOL, 4)

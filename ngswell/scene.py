@@ -223,6 +223,8 @@ class Scene:
         """Salt concentration [mol/l] and hydraulic pressure [N/mm²] that the initial state is in equilibrium with."""
         if self.initial is not None:
             Bath("initial", *self.initial)
+            if self.initial[0] is None and "cations" in self.model.held:
+                raise InputError(f"initial: {type(self.model).__name__} needs a salt concentration [mol/l], got None")
             return self.initial
         if not self.baths:
             raise InputError("the scene has no bath: give initial=(concentration, hydraulic pressure)")
@@ -257,6 +259,7 @@ class Scene:
             lines.append(f"  {balance}: {', '.join(names)}")
         for bath in self.baths:
             lines.append(f"  bath on {bath.boundary}: {self.treatment(bath)}")
+        lines += [f"  {name}: {law}" for name, law in self.material.laws().items()]
         return "\n".join(lines)
 
     # -- running -------------------------------------------------------------------------------------------------------

@@ -7,15 +7,15 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import ClassVar
 
-from ngsolve import H1, CoefficientFunction, FESpace, InnerProduct, Mesh
+from ngsolve import CoefficientFunction
 
 from ngswell import donnan, laws
-from ngswell.baths import Bath, BathFields, Essential, Penalty
+from ngswell.baths import Bath, BathFields
 from ngswell.errors import InputError
 from ngswell.kinematics import Kinematics
 from ngswell.materials import Field, Material
 from ngswell.models.mechanics import SolidState
-from ngswell.models.terms import Term, check_order
+from ngswell.models.one_pressure import OnePressure
 from ngswell.schedules import Blend
 from ngswell.supports import Weight
 
@@ -26,6 +26,11 @@ class State(SolidState):
 
     bath: BathFields
     P: CoefficientFunction
+
+    @property
+    def pressure(self) -> CoefficientFunction:
+        """What a bath prescribes [N/mm²]."""
+        return self.P
 
     @cached_property
     def pore_pressure(self) -> CoefficientFunction:
@@ -69,25 +74,15 @@ class State(SolidState):
 
 
 @dataclass(frozen=True)
-class LocalDonnan:
+class LocalDonnan(OnePressure):
     """Unknowns u (order k) and hydraulic pressure P (order k − 1); the limit of fast ion diffusion in the full model.
 
     The ions follow the bath at once, at the start too: a bath that differs from the scene's `initial` is a sudden change.
     """
 
-    order: int = 2
-
     unknowns: ClassVar[tuple[str, ...]] = ("u", "P")
-    balances: ClassVar[tuple[str, ...]] = ("momentum", "fluid")
     held: ClassVar[dict[str, str]] = {"fluid": "P"}
     evolving: ClassVar[dict[str, float]] = {"u": 1e-2, "P": 1e-1}
-    treatments: ClassVar[tuple[type, ...]] = (Essential, Penalty)
-
-    def __post_init__(self) -> None:
-        check_order("LocalDonnan", self.order)
-
-    def default_treatment(self) -> Essential:
-        return Essential()
 
     def check(self, material: Material, baths: Sequence[Bath]) -> None:
         if not baths or any(bath.c is None for bath in baths):
@@ -105,10 +100,6 @@ class LocalDonnan:
                     "LocalDonnan has the ions in equilibrium with one bath; use Concentration"
                 )
 
-    def space(self, mesh: Mesh, kinematics: Kinematics, held: dict[str, str], essential: str) -> FESpace:
-        V = kinematics.space(mesh, self.order, held)
-        return FESpace([V, H1(mesh, order=self.order - 1, dirichlet=essential)])
-
     def state(
         self,
         functions: Sequence[CoefficientFunction],
@@ -119,26 +110,3 @@ class LocalDonnan:
         bath: BathFields | None,
     ) -> State:
         return State(material, kinematics, charge, weight, functions[0], bath, functions[1])  # type: ignore[arg-type]
-
-    def equilibrium(self, bath: BathFields, cfc: CoefficientFunction, material: Material) -> dict[str, CoefficientFunction]:
-        return {"P": bath.P}
-
-    def terms(self, state: State, tests: Sequence[CoefficientFunction]) -> list[Term]:
-        v, q = tests
-        flux = state.seepage(state.pull)
-        return [
-            *state.momentum(state.pore_pressure, v),
-            Term("fluid", "storage", state.content * q, "rate"),
-            Term("fluid", "seepage", -InnerProduct(flux, state.kinematics.flow_gradient(q))),
-        ]
-
-    def weak_terms(
-        self, state: State, tests: Sequence[CoefficientFunction], bath: BathFields, factors: tuple[Field, Field]
-    ) -> dict[str, CoefficientFunction]:
-        return {"fluid": factors[0] * (state.P - bath.P) * tests[1]}
-
-    def references(self, concentration: float, stress: float, length: float) -> dict[str, float]:
-        return {"u": length, "P": stress}
-
-    def bounds(self, state: State) -> dict[str, CoefficientFunction]:
-        return {"fluid content J − nS0": state.content}

@@ -1,11 +1,14 @@
 """The discrete system: linearisation, named terms, boundary measure, solvers, Newton's tests."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from conftest import confined_column, strip
 from ngsolve import IfPos, x, y
 
 from ngswell import (
+    TABLE_1,
     TABLE_2,
     Bath,
     Concentration,
@@ -15,6 +18,7 @@ from ngswell import (
     Newton,
     Penalty,
     PlaneStrain,
+    PowerLaw,
     Ramp,
     Roller,
     Scene,
@@ -98,6 +102,8 @@ def test_a_scene_has_only_the_terms_it_needs():
     assert "efflux" not in strip(Lagged()).describe()
     assert "traction" not in strip(loads=[]).describe()
     assert "weight" in block().describe()
+    assert "permeability" not in bare
+    assert "permeability: PowerLaw(m=2.0)" in strip(material=replace(TABLE_1, permeability=PowerLaw(2.0))).describe()
 
 
 def test_efflux_is_per_current_area():
