@@ -44,7 +44,7 @@ def homogeneous_equilibrium(
     """
     if motion not in FREE_DIRECTIONS:
         raise InputError(f"motion {motion!r} is none of {', '.join(FREE_DIRECTIONS)}")
-    mu, lam, nS0, cfc0 = (_number(name, getattr(material, name)) for name in ("mu", "lam", "nS0", "cfc0"))
+    mu, lam, nS0, cfc0 = (material.number(name) for name in ("mu", "lam", "nS0", "cfc0"))
 
     def charge(J: float) -> float:
         return (1 - nS0) * cfc0 / (J - nS0)
@@ -81,12 +81,6 @@ def lagged_column_factor(material: Material, bath: float) -> float:
     follows the charge of the step before: δp = (dp_D/dcfc) (dcfc/dJ) δJ_old. The factor is their product over 2µ + λ,
     whatever the time step; the column is stable while it stays above −1.
     """
-    mu, lam, nS0, cfc0 = (_number(name, getattr(material, name)) for name in ("mu", "lam", "nS0", "cfc0"))
+    mu, lam, nS0, cfc0 = (material.number(name) for name in ("mu", "lam", "nS0", "cfc0"))
     slope = 2 * material.phi * material.RT * (cfc0 / 4) / ((material.Gamma * bath) ** 2 + cfc0 * cfc0 / 4) ** 0.5
     return slope * (-cfc0 / (1 - nS0)) / (2 * mu + lam)
-
-
-def _number(name: str, value: object) -> float:
-    if not isinstance(value, (int, float)):
-        raise InputError(f"{name} varies in space: there is no homogeneous equilibrium")
-    return float(value)

@@ -11,6 +11,7 @@ from ngsolve import CF, H1, CoefficientFunction, Cof, FESpace, Grad, Id, IfPos, 
 from numpy.typing import NDArray
 
 from ngswell.errors import InputError
+from ngswell.quadrature import vertices
 
 
 class Kinematics(Protocol):
@@ -148,12 +149,12 @@ class Axisymmetric:
     directions = "rz"
 
     def check(self, mesh: Mesh, held: dict[str, str]) -> None:
-        vertices = np.array([vertex.point for vertex in mesh.vertices])
-        inner, size = vertices[:, 0].min(), vertices[:, 0].max()
+        radii = vertices(mesh)[:, 0]
+        inner, size = radii.min(), radii.max()
         if inner < -1e-12 * abs(size):
             raise InputError(f"Axisymmetric: the mesh crosses the axis, its first coordinate r falls to {inner:g} mm")
         names = [name for name in held["r"].split("|") if name]
-        on_axis = set(np.flatnonzero(vertices[:, 0] <= 1e-12 * size))
+        on_axis = set(np.flatnonzero(radii <= 1e-12 * size))
         fixed = {v.nr for name in names for element in mesh.Boundaries(name).Elements() for v in element.vertices}
         if on_axis - fixed:
             raise InputError("Axisymmetric: the mesh touches the axis r = 0; hold it there, Roller(boundary, 'r')")

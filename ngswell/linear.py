@@ -48,7 +48,7 @@ class _Gel(NamedTuple):
 
 def _gel(material: Material, bath: float) -> _Gel:
     mu, lam, nS0, cfc0, D_plus, D_minus, K = (
-        _number(name, getattr(material, name)) for name in ("mu", "lam", "nS0", "cfc0", "D_plus", "D_minus", "K")
+        material.number(name) for name in ("mu", "lam", "nS0", "cfc0", "D_plus", "D_minus", "K")
     )
     if not 0 < bath <= 10:
         raise InputError(f"bath of {bath!r} mol/l is outside 0 … 10 (0 excluded): give the concentration c̄ in mol/l")
@@ -57,12 +57,6 @@ def _gel(material: Material, bath: float) -> _Gel:
     minus = bath * bath / plus
     share = 2 * bath * bath / total
     return _Gel(plus, minus, total, cfc0, 1 - nS0, 2 * mu + lam, material.RT, share, D_plus, D_minus, K)
-
-
-def _number(name: str, value: object) -> float:
-    if not isinstance(value, (int, float, np.integer, np.floating)):
-        raise InputError(f"{name} varies in space: the closed form needs a uniform gel, give a number")
-    return float(value)
 
 
 def storage(material: Material, bath: float) -> NDArray:

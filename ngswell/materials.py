@@ -167,6 +167,13 @@ class Material:
         """Rθ [N/mm² per mol/l]."""
         return GAS_CONSTANT * self.theta
 
+    def number(self, name: str) -> float:
+        """The parameter `name` as one number, for closed forms; InputError if it is a field of position."""
+        value = getattr(self, name)
+        if isinstance(value, CoefficientFunction):
+            raise InputError(f"{name} varies in space: closed forms hold for a homogeneous body, give a number")
+        return float(value)
+
     def laws(self) -> dict[str, object]:
         """The constitutive choices that are not the paper's, by name."""
         names = ("permeability", "diffusivity", "phi", "phi_bath", "Gamma")

@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 
 from ngswell.baths import Bath, BathFields, Penalty, Treatment
 from ngswell.models.terms import Term
-from ngswell.quadrature import points
+from ngswell.quadrature import points, vertices
 from ngswell.schedules import Signal
 from ngswell.supports import Traction, Weight
 
@@ -274,7 +274,7 @@ class Problem:
     def references(self) -> dict[str, float]:
         """A size of each unknown that the scene itself sets, so that tolerances need no units."""
         scene = self.scene
-        corners = np.array([vertex.point for vertex in self.mesh.vertices])
+        corners = vertices(self.mesh)
         length = float(np.linalg.norm(corners.max(axis=0) - corners.min(axis=0)))
         charge = scene.material.largest("cfc0", self.mesh) * max(map(abs, scene.charge.values))
         baths = [value for bath in scene.baths if bath.concentration for value in bath.concentration.values]

@@ -23,7 +23,7 @@ from ngswell.models import Concentration, Model
 from ngswell.newton import Newton
 from ngswell.observers.base import Observer
 from ngswell.problem import Problem, Snapshot
-from ngswell.quadrature import points
+from ngswell.quadrature import points, vertices
 from ngswell.schedules import Ramp
 from ngswell.stepping import Adaptive, BackwardEuler, Control, StepReport
 from ngswell.supports import Load, Pin, Roller, Support, Symmetry, Traction, Weight
@@ -151,37 +151,37 @@ class Scene:
     def _check_rigid_motions(self) -> None:
         """Refuse supports that leave the body free to translate or rotate."""
         directions = self.kinematics.directions
-        rows, vertices = [], np.array([vertex.point for vertex in self.mesh.vertices])
-        vertices -= vertices.mean(axis=0)
-        vertices /= np.abs(vertices).max()
+        rows, held, places = [], self.held(), vertices(self.mesh)
+        places -= places.mean(axis=0)
+        places /= np.abs(places).max()
         for axis, direction in enumerate(directions):
             fixed = {
                 vertex.nr
-                for name in self.held()[direction].split("|")
+                for name in held[direction].split("|")
                 if name
                 for element in self.mesh.Boundaries(name).Elements()
                 for vertex in element.vertices
             }
             fixed |= {self._vertex(s) for s in self.supports if isinstance(s, Pin) and direction in s.direction}
-            rows += [self.kinematics.rigid_motions(vertices[number])[axis] for number in fixed]
-        shapes = self.kinematics.rigid_motions(vertices[0])
+            rows += [self.kinematics.rigid_motions(places[number])[axis] for number in fixed]
+        shapes = self.kinematics.rigid_motions(places[0])
         motions = shapes.shape[1]
         _, sizes, modes = np.linalg.svd(np.array(rows).reshape(-1, motions))
         rank = int((sizes > 1e-9).sum())
         if rank < motions:
             motion = int(np.argmax(np.abs(modes[-1])))
-            uniform = (shapes[:, motion] == self.kinematics.rigid_motions(vertices[-1])[:, motion]).all()
+            uniform = (shapes[:, motion] == self.kinematics.rigid_motions(places[-1])[:, motion]).all()
             free = f"translate in {directions[int(np.argmax(np.abs(shapes[:, motion])))]}" if uniform else "rotate"
             raise InputError(f"the body can {free}: add a Roller, Symmetry or Pin")
 
     def _vertex(self, pin: Pin) -> int:
-        vertices = np.array([vertex.point for vertex in self.mesh.vertices])
+        places = vertices(self.mesh)
         if len(pin.point) != self.mesh.dim:
             raise InputError(f"Pin at {pin.point} needs {self.mesh.dim} coordinates [mm]")
-        distances = np.linalg.norm(vertices - np.array(pin.point), axis=1)
+        distances = np.linalg.norm(places - np.array(pin.point), axis=1)
         nearest = int(np.argmin(distances))
-        if distances[nearest] > 1e-9 * max(1.0, float(np.abs(vertices).max())):
-            raise InputError(f"Pin at {pin.point}: no mesh vertex there; the nearest is {tuple(vertices[nearest])}")
+        if distances[nearest] > 1e-9 * max(1.0, float(np.abs(places).max())):
+            raise InputError(f"Pin at {pin.point}: no mesh vertex there; the nearest is {tuple(places[nearest])}")
         return nearest
 
     def _normal_direction(self, support: Symmetry) -> str:

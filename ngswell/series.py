@@ -23,7 +23,7 @@ EARLIEST = 1e-8
 
 def consolidation_coefficient(material: Material) -> float:
     """c_v = K (2µ + λ) [mm²/s]."""
-    return _number(material, "K") * _modulus(material)
+    return material.number("K") * _modulus(material)
 
 
 def terzaghi_pressure(material: Material, load: float, height: float, z: ArrayLike, time: ArrayLike) -> NDArray:
@@ -67,7 +67,7 @@ def mandel_shortening(material: Material, load: float, half_width: float, time: 
     _, T = _scaled(material, "half_width", half_width, 0.0, time)
     alpha, amplitude = _mandel_modes(material, T)
     mean = load * (amplitude * (np.sin(alpha) / alpha - np.cos(alpha)) * np.exp(-(alpha**2) * T)).sum(axis=-1)
-    mu, lam = _number(material, "mu"), _number(material, "lam")
+    mu, lam = material.number("mu"), material.number("lam")
     return (load * _modulus(material) / (2 * mu) - mean) / (2 * mu + 2 * lam)
 
 
@@ -96,7 +96,7 @@ def cryer_settlement(material: Material, load: float, radius: float, time: Array
     """
     _, T = _scaled(material, "radius", radius, 0.0, time)
     alpha, denominator = _cryer_modes(material, T)
-    mu, lam = _number(material, "mu"), _number(material, "lam")
+    mu, lam = material.number("mu"), material.number("lam")
     transient = (np.sin(alpha) / denominator * np.exp(-(alpha**2) * T)).sum(axis=-1) / (2 * mu)
     return load * radius * (1 / (2 * mu + 3 * lam) + transient)
 
@@ -110,7 +110,7 @@ def _terzaghi_roots(T: NDArray) -> NDArray:
 
 def _mandel_modes(material: Material, T: NDArray) -> tuple[NDArray, NDArray]:
     """Roots of tan α = (M/µ) α, one in each (nπ, nπ + π/2) as M/µ > 1, and sin α / (α − sin α cos α)."""
-    slope = _modulus(material) / _number(material, "mu")
+    slope = _modulus(material) / material.number("mu")
     low = np.arange(_terms(T)) * pi
     low[0] = 1e-3  # α = 0 is no mode, and the first root is at 1.17 or above
     alpha = _roots(lambda a: np.sin(a) - slope * a * np.cos(a), low, np.arange(low.size) * pi + pi / 2)
@@ -119,7 +119,7 @@ def _mandel_modes(material: Material, T: NDArray) -> tuple[NDArray, NDArray]:
 
 def _cryer_modes(material: Material, T: NDArray) -> tuple[NDArray, NDArray]:
     """Roots of (η − α²) tan α = η α, one in each (nπ − π/2, nπ) as η ≤ 2, and α cos α + (2 − η) sin α."""
-    eta = 4 * _number(material, "mu") / _modulus(material)
+    eta = 4 * material.number("mu") / _modulus(material)
     high = np.arange(1, _terms(T) + 1) * pi
     alpha = _roots(lambda a: (eta - a * a) * np.sin(a) - eta * a * np.cos(a), high - pi / 2, high)
     return alpha, alpha * np.cos(alpha) + (2 - eta) * np.sin(alpha)
@@ -158,11 +158,4 @@ def _scaled(material: Material, name: str, length: float, position: ArrayLike, t
 
 def _modulus(material: Material) -> float:
     """M = 2µ + λ, the stiffness in confined compression [N/mm²]."""
-    return 2 * _number(material, "mu") + _number(material, "lam")
-
-
-def _number(material: Material, name: str) -> float:
-    value = getattr(material, name)
-    if not isinstance(value, (int, float)):
-        raise InputError(f"{name} varies in space: the series need a homogeneous body, give a number")
-    return float(value)
+    return 2 * material.number("mu") + material.number("lam")

@@ -14,6 +14,8 @@ Numbers, all relative unless a unit is given:
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
@@ -24,6 +26,7 @@ from numpy.typing import NDArray
 
 from ngswell import (
     TABLE_1,
+    TABLE_2,
     Axisymmetric,
     Bath,
     Concentration,
@@ -61,7 +64,7 @@ from studies.output import Findings, cost
 
 def gel(cfc0: float) -> Material:
     """Table 2 with another charge [mol/l]."""
-    return Material(mu=0.12, lam=0.02, nS0=0.25, cfc0=cfc0, D_plus=5e-4, D_minus=8e-4, K=1.07e-3)
+    return replace(TABLE_2, cfc0=cfc0)
 
 
 def homogeneous_body(motion: str, cfc0: float, bath: float, model: Model | None = None) -> Scene:
@@ -145,18 +148,18 @@ def terzaghi(ax: Axes, results: list[Result]) -> dict[str, float]:
     return {"terzaghi_error": float(max(errors))}
 
 
-def quarter_disc() -> Mesh:
+def quarter_disc(maxh: float) -> Mesh:
     """Curved triangles in the (r, z) quarter-plane with boundaries axis, bottom and surface."""
     face = Circle((0, 0), 1).Face() * MoveTo(0, 0).Rectangle(2, 2).Face()
     for edge in face.edges:
         edge.name = "axis" if edge.center.x < 1e-6 else "bottom" if edge.center.y < 1e-6 else "surface"
-    return Mesh(OCCGeometry(face, dim=2).GenerateMesh(maxh=0.3)).Curve(4)
+    return Mesh(OCCGeometry(face, dim=2).GenerateMesh(maxh=maxh))
 
 
 def cryer(ax: Axes, results: list[Result]) -> dict[str, float]:
     """Pressure at the centre of a sphere under hydrostatic load: it rises before it drains."""
     scene = Scene(
-        mesh=quarter_disc(),
+        mesh=quarter_disc(0.3).Curve(4),
         kinematics=Axisymmetric(),
         material=DRAINED,
         model=Uncharged(4),

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from math import isclose
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ngswell.errors import InputError
 from ngswell.problem import Problem
@@ -23,6 +24,12 @@ class Observer:
             raise InputError(f"{type(self).__name__}: the interval has to be positive, got {when} s")
         self.when = when
         self._times: list[float] = []
+        self._recorded: list[float] = []
+
+    @property
+    def time(self) -> NDArray:
+        """Times of the records [s]."""
+        return np.array(self._recorded)
 
     def times(self, begin: float, until: float) -> list[float]:
         """Times [s] on which steps have to land."""
@@ -42,13 +49,16 @@ class Observer:
 
     def start(self, problem: Problem, begin: float, until: float) -> None:
         """Called once, with the initial state."""
-        if self._due(begin):
-            self.record(problem, begin)
+        self._record_if_due(problem, begin)
 
     def observe(self, problem: Problem, report: StepReport) -> None:
         """Called after every accepted step."""
-        if self._due(report.time):
-            self.record(problem, report.time)
+        self._record_if_due(problem, report.time)
+
+    def _record_if_due(self, problem: Problem, time: float) -> None:
+        if self._due(time):
+            self._recorded.append(time)
+            self.record(problem, time)
 
     def record(self, problem: Problem, time: float) -> None:
         """Called at the start and after accepted steps, where due."""

@@ -24,7 +24,6 @@ class Ledger(Observer):
 
     def __init__(self) -> None:
         super().__init__()
-        self._time: list[float] = []
         self._held: dict[str, list[float]] = {}
         self._left: dict[tuple[str, str], list[float]] = {}
 
@@ -53,7 +52,6 @@ class Ledger(Observer):
     def record(self, problem: Problem, time: float) -> None:
         problem.contents(self._vector)
         held = self._vector.FV().NumPy()
-        self._time.append(time)
         for name, unknown in problem.model.held.items():
             self._held.setdefault(name, []).append(held[self._vertices[unknown]].sum())
 
@@ -70,10 +68,6 @@ class Ledger(Observer):
         for key, amount in gone.items():
             self._left[key].append(self._left[key][-1] + amount)
         super().observe(problem, report)
-
-    @property
-    def time(self) -> NDArray:
-        return np.array(self._time)
 
     @property
     def fluid(self) -> NDArray:

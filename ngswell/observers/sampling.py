@@ -23,7 +23,7 @@ def _output(problem: Problem, name: str) -> CoefficientFunction:
 class Probe(Observer):
     """Quantities at a point of the reference configuration [mm].
 
-    `Probe((1.1, 0.5), "J", "p")`; then `probe.times` and `probe.values["J"]` are arrays, one row a record. Quantities and
+    `Probe((1.1, 0.5), "J", "p")`; then `probe.time` and `probe.values["J"]` are arrays, one row a record. Quantities and
     units are those of `ngswell.models.OUTPUT_UNITS`.
     """
 
@@ -32,7 +32,6 @@ class Probe(Observer):
         if not quantities:
             raise InputError("Probe: name at least one quantity, such as 'displacement'")
         self.point, self.quantities = tuple(point), quantities
-        self._seen: list[float] = []
         self._values: dict[str, list] = {name: [] for name in quantities}
 
     def start(self, problem: Problem, begin: float, until: float) -> None:
@@ -42,15 +41,9 @@ class Probe(Observer):
         super().start(problem, begin, until)
 
     def record(self, problem: Problem, time: float) -> None:
-        self._seen.append(time)
         point = problem.mesh(*self.point)
         for name, field in self._fields.items():
             self._values[name].append(field(point))
-
-    @property
-    def time(self) -> NDArray:
-        """Times of the records [s]."""
-        return np.array(self._seen)
 
     @property
     def values(self) -> dict[str, NDArray]:
@@ -69,7 +62,6 @@ class Integral(Observer):
     ) -> None:
         super().__init__(when)
         self.quantity, self.boundary = quantity, boundary
-        self._seen: list[float] = []
         self._values: list = []
 
     def start(self, problem: Problem, begin: float, until: float) -> None:
@@ -88,13 +80,7 @@ class Integral(Observer):
         super().start(problem, begin, until)
 
     def record(self, problem: Problem, time: float) -> None:
-        self._seen.append(time)
         self._values.append(Integrate(self._density, order=2 * problem.model.order + 2, **self._region))
-
-    @property
-    def time(self) -> NDArray:
-        """Times of the records [s]."""
-        return np.array(self._seen)
 
     @property
     def values(self) -> NDArray:

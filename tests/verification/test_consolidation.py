@@ -10,8 +10,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from netgen.occ import Circle, MoveTo, OCCGeometry
-from ngsolve import CF, Grad, Mesh
+from ngsolve import CF, Grad
 
 from ngswell import (
     Axisymmetric,
@@ -34,6 +33,7 @@ from ngswell import (
     series,
 )
 from ngswell.models.terms import Term
+from studies.verification import quarter_disc
 
 SOLID = {"mu": 0.24, "lam": 0.16, "nS0": 0.25, "cfc0": 0.0, "D_plus": 5e-4, "D_minus": 8e-4}
 MATERIAL = Material(**SOLID, K=1e-3)
@@ -294,22 +294,14 @@ def test_mandel_needs_the_plate():
 # -- Cryer ---------------------------------------------------------------------------------------------------------------
 
 
-def quarter_disc(refinements):
-    """Curved triangles on the quarter of the unit disc, r along x and z along y."""
-    face = Circle((0, 0), 1).Face() * MoveTo(0, 0).Rectangle(2, 2).Face()
-    for edge in face.edges:
-        edge.name = "axis" if edge.center.x < 1e-6 else "bottom" if edge.center.y < 1e-6 else "surface"
-    mesh = Mesh(OCCGeometry(face, dim=2).GenerateMesh(maxh=0.5))
-    for _ in range(refinements):
-        mesh.Refine()
-    return mesh
-
-
 def cryer(refinements=1, order=4, kinematics=None):
     """The sphere, sucked by its bath instead of loaded; probes of p at the centre and at half the radius on the axis, on the
     diagonal and at the bottom, and of the surface's displacement at the pole and at the equator."""
+    mesh = quarter_disc(0.5)
+    for _ in range(refinements):
+        mesh.Refine()
     scene = Scene(
-        mesh=quarter_disc(refinements).Curve(order), kinematics=kinematics or Axisymmetric(), material=MATERIAL,
+        mesh=mesh.Curve(order), kinematics=kinematics or Axisymmetric(), material=MATERIAL,
         model=Uncharged(order), supports=[Roller("axis", "r"), Roller("bottom", "z")],
         baths=[Bath("surface", P=-LOAD)], initial=(None, 0.0),
     )  # fmt: skip
