@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from ngswell.baths import Bath, Essential, Frozen, Lagged, Penalty
+from ngswell.baths import Bath, Essential, Frozen, Lagged, Multiplier, Nitsche, Penalty
 from ngswell.errors import InputError, NgswellError, OutputError, StepError
 from ngswell.gmsh import read_mesh
 from ngswell.kinematics import Axisymmetric, Confined, PlaneStrain, Solid
 from ngswell.materials import TABLE_1, TABLE_2, HolmesMow, MackieMeares, Material, PowerLaw
 from ngswell.meshes import box, check_mesh, column, from_occ, rectangle
-from ngswell.models import Concentration, LocalDonnan, Uncharged
+from ngswell.models import Concentration, LocalDonnan, Potential, Uncharged
 from ngswell.newton import Newton
 from ngswell.observers import VTK, Area, Integral, Ledger, Probe, Progress, Snapshots
 from ngswell.scene import Result, Scene
@@ -21,7 +21,8 @@ __version__ = "0.1.0"
 __all__ = [
     "TABLE_1", "TABLE_2", "VTK", "Adaptive", "Area", "Axisymmetric", "Bath", "Blend", "Concentration", "Confined",
     "Essential", "Fixed", "Frozen", "HolmesMow", "InputError", "Integral", "Lagged", "Ledger", "LocalDonnan",
-    "MackieMeares", "Material", "Newton", "NgswellError", "OutputError", "Penalty", "Pin", "PlaneStrain", "PowerLaw",
-    "Probe", "Progress", "Ramp", "Result", "Roller", "Scene", "Snapshots", "Solid", "StepError", "Symmetry", "Traction",
-    "Uncharged", "Weight", "box", "check_mesh", "column", "from_occ", "read_mesh", "rectangle",
+    "MackieMeares", "Material", "Multiplier", "Newton", "NgswellError", "Nitsche", "OutputError", "Penalty", "Pin",
+    "PlaneStrain", "Potential", "PowerLaw", "Probe", "Progress", "Ramp", "Result", "Roller", "Scene", "Snapshots",
+    "Solid", "StepError", "Symmetry", "Traction", "Uncharged", "Weight", "box", "check_mesh", "column", "from_occ",
+    "read_mesh", "rectangle",
 ]  # fmt: skip

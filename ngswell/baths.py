@@ -56,6 +56,54 @@ class Penalty:
 
 
 @dataclass(frozen=True)
+class Nitsche:
+    """Equilibrium imposed weakly and consistently: the boundary fluxes W·N stay in the balances, beside a penalty
+
+        fluid efflux W·N + γ K/h (p − p_D),   cation efflux W₊·N + γ D₊/h (c − c_D),
+
+    and the same fluxes of the test functions act on the excess: with `adjoint` "symmetric" as in Nitsche's method for
+    symmetric problems, with "skew" so that they cancel in the balance of energy (then γ = 0 is possible), with "none" not
+    at all. J. Nitsche, Abh. Math. Sem. Univ. Hamburg 36 (1971) 9; E. Burman, SIAM J. Numer. Anal. 50 (2012) 1959.
+    """
+
+    gamma: float = 20.0
+    adjoint: str = "symmetric"
+
+    def __post_init__(self) -> None:
+        if self.adjoint not in ("symmetric", "skew", "none"):
+            raise InputError(f"Nitsche: adjoint {self.adjoint!r} is none of 'symmetric', 'skew', 'none'")
+        least = "at least 0" if self.adjoint == "skew" else "positive"
+        if not (0 <= self.gamma < float("inf")) or (self.gamma == 0 and self.adjoint != "skew"):
+            raise InputError(
+                f"Nitsche with adjoint {self.adjoint!r}: gamma has to be {least} and finite, got {self.gamma!r}"
+            )
+
+    def __str__(self) -> str:
+        return f"Nitsche, {self.adjoint} adjoint, γ = {self.gamma:g}"
+
+    def factors(self, material: Material, h: float) -> tuple[Field, Field]:
+        """γ K/h [mm³/(N s)] and γ D₊/h [mm/s]."""
+        return self.gamma * material.K / h, self.gamma * material.D_plus / h
+
+
+@dataclass(frozen=True)
+class Multiplier:
+    """Equilibrium imposed by Lagrange multipliers on the bath's boundary, which are the effluxes:
+
+        ∫ (p − p_D) δ da = 0,  ∫ (c − c_D) δ da = 0   for every trace δ,   effluxes K/h times the one, D₊/h times the other.
+
+    Measured in K/h and D₊/h the multipliers have the dimensions of p and c.
+    """
+
+    def __str__(self) -> str:
+        return "Lagrange multipliers"
+
+    def factors(self, material: Material, h: float) -> tuple[Field, Field]:
+        """K/h [mm³/(N s)] and D₊/h [mm/s]."""
+        return material.K / h, material.D_plus / h
+
+
+@dataclass(frozen=True)
 class Lagged:
     """Prescribed values with the boundary charge of the last accepted step: the scheme that oscillates (Fig. 8, upper)."""
 
@@ -77,7 +125,7 @@ class Frozen:
 
 @dataclass(frozen=True)
 class Essential:
-    """Prescribed values, for models whose unknowns in equilibrium with a bath do not depend on the charge."""
+    """Prescribed values, for models whose unknowns in equilibrium with a bath do not depend on the charge: exact."""
 
     charge_of = None
 
@@ -85,7 +133,8 @@ class Essential:
         return "prescribed"
 
 
-Treatment: TypeAlias = Penalty | Lagged | Frozen | Essential
+Weak: TypeAlias = Penalty | Nitsche | Multiplier
+Treatment: TypeAlias = Weak | Lagged | Frozen | Essential
 
 
 @dataclass(frozen=True)
@@ -115,7 +164,7 @@ class Bath:
         if self.treatment is not None and not isinstance(self.treatment, Treatment):
             raise InputError(
                 f"bath on {self.boundary!r}: treatment {self.treatment!r} is none of "
-                "Penalty(...), Lagged(), Frozen(), Essential()"
+                "Penalty(...), Nitsche(), Multiplier(), Lagged(), Frozen(), Essential()"
             )
 
     @property

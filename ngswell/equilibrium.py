@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from numpy.typing import NDArray
 
-from ngswell.baths import Essential, Penalty
+from ngswell.baths import Frozen, Lagged
 from ngswell.errors import InputError, StepError
 from ngswell.newton import Newton, Outcome
 from ngswell.problem import Snapshot
@@ -34,7 +34,7 @@ def equilibrate(scene: Scene, time: float | None = None, newton: Newton | None =
     if not scene.baths:
         raise InputError("equilibrate: the body is sealed, so its content at rest is not determined; give it a bath")
     for bath in scene.baths:
-        if not isinstance(scene.treatment(bath), (Penalty, Essential)):
+        if isinstance(scene.treatment(bath), (Lagged, Frozen)):
             raise InputError(f"equilibrate: the bath on {bath.boundary!r} remembers the past ({scene.treatment(bath)})")
     problem, method = scene.problem, newton or Newton()
     problem.initialise(charge_share=0.0)

@@ -48,6 +48,11 @@ class Kinematics(Protocol):
         """Reference volume (and area) per mesh volume (and area)."""
         ...
 
+    @property
+    def normal(self) -> CoefficientFunction:
+        """Outer normal N of the reference configuration, as long as the tensors are wide."""
+        ...
+
     def area_stretch(self, u: CoefficientFunction) -> CoefficientFunction:
         """da/dA = |Cof(F) N| on a boundary [-]; u is a trial function."""
         ...
@@ -64,6 +69,10 @@ class Confined:
     dimension = 1
     directions = "x"
     weight = 1.0
+
+    @property
+    def normal(self) -> CoefficientFunction:
+        return specialcf.normal(1)
 
     def check(self, mesh: Mesh, held: dict[str, str]) -> None:
         pass
@@ -109,9 +118,13 @@ class _Cartesian:
     def flow_vector(self, components: tuple[float, ...]) -> CoefficientFunction:
         return CF(components)
 
+    @property
+    def normal(self) -> CoefficientFunction:
+        return specialcf.normal(self.dimension)
+
     def area_stretch(self, u: CoefficientFunction) -> CoefficientFunction:
         # Cof(F) N needs tangential derivatives only, which the trace has.
-        return Norm(Cof(Id(self.dimension) + Grad(u).Trace()) * specialcf.normal(self.dimension))
+        return Norm(Cof(Id(self.dimension) + Grad(u).Trace()) * self.normal)
 
 
 @dataclass(frozen=True)
@@ -175,9 +188,13 @@ class Axisymmetric:
     def weight(self) -> CoefficientFunction:
         return 2 * pi * x
 
+    @property
+    def normal(self) -> CoefficientFunction:
+        components = specialcf.normal(2)
+        return CF((components[0], components[1], 0.0))
+
     def area_stretch(self, u: CoefficientFunction) -> CoefficientFunction:
-        normal = specialcf.normal(2)
-        return Norm(Cof(Id(3) + _with_hoop(Grad(u).Trace(), u)) * CF((normal[0], normal[1], 0.0)))
+        return Norm(Cof(Id(3) + _with_hoop(Grad(u).Trace(), u)) * self.normal)
 
     def rigid_motions(self, point: NDArray) -> NDArray:
         return np.array([[0.0], [1.0]])

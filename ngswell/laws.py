@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 from ngsolve import CoefficientFunction, Det, Id, InnerProduct, log
 
+from ngswell import donnan
 from ngswell.materials import Field, Material
 
 
@@ -61,6 +62,40 @@ class Transport(NamedTuple):
     fluid: CoefficientFunction
     cations: CoefficientFunction
     anions: CoefficientFunction
+
+
+def transport_by_potentials(
+    material: Material,
+    nF: CoefficientFunction,
+    bath: CoefficientFunction,
+    cfc: CoefficientFunction,
+    drive: CoefficientFunction,
+    grad_bath: CoefficientFunction,
+) -> Transport:
+    """The same fluxes, (19) to (22), from the gradients of the virtual bath (P, c̃) in equilibrium with the point.
+
+    `bath` is c̃, `drive` is grad P (less the fluid's weight). With the electrochemical potentials over Rθ, grad µ₊ + grad µ₋
+    = 2 grad ln c̃, and zero current for grad µ₊,
+
+        nF wF     = −K [grad P − 2 φ̄ Rθ grad c̃ + Rθ (cfc grad µ₊ + 2 c₋ grad ln c̃)]
+        nF c₊ w₊  = −nF D₊ c₊ grad µ₊ + c₊ nF wF
+        grad µ₊   = {2 (D₋ − D_L) c₋ grad ln c̃ − D_L/Rθ [grad P − 2 φ̄ Rθ grad c̃]} / Θ.
+
+    c₋ grad ln c̃ = (Γ²c̃/c₊) grad c̃ has no pole at c̃ = 0. Θ, D_L as in `transport`.
+    """
+    m, RT = material, material.RT
+    K = permeability(m.nS0 / (1 - nF), m)
+    D_plus, D_minus = diffusivities(nF, m)
+    plus, minus = donnan.cations(bath, cfc, m.Gamma), donnan.anions(bath, cfc, m.Gamma)
+    D_L = cfc * K * RT / nF
+    conductance = D_plus * plus + D_minus * minus + D_L * cfc
+    of_fluid = drive - 2 * m.phi_bath * RT * grad_bath
+    of_anions = (m.Gamma**2 * bath / plus) * grad_bath  # c₋ grad ln c̃
+    of_cations = (2 * (D_minus - D_L) * of_anions - D_L / RT * of_fluid) / conductance  # grad µ₊
+    fluid = -K * (of_fluid + RT * (cfc * of_cations + 2 * of_anions))
+    cations = -nF * D_plus * plus * of_cations + plus * fluid
+    anions = -nF * D_minus * (2 * of_anions - minus * of_cations) + minus * fluid
+    return Transport(fluid, cations, anions)
 
 
 def transport(

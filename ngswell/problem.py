@@ -9,11 +9,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from ngsolve import (
     CF,
+    H1,
     VOL,
     BaseMatrix,
     BaseVector,
     BilinearForm,
     BitArray,
+    Compress,
+    FESpace,
     GridFunction,
     InnerProduct,
     Integrate,
@@ -27,11 +30,12 @@ from ngsolve import (
 )
 from numpy.typing import NDArray
 
-from ngswell.baths import Bath, BathFields, Penalty, Treatment
-from ngswell.models.terms import Term
+from ngswell.baths import Bath, BathFields, Multiplier, Treatment, Weak
+from ngswell.models.terms import Setting, Term
 from ngswell.quadrature import points, vertices
 from ngswell.schedules import Signal
 from ngswell.supports import Traction, Weight
+from ngswell.weak import weak_terms
 
 if TYPE_CHECKING:
     from ngswell.scene import Scene
@@ -85,10 +89,15 @@ class Problem:
         material = scene.material
 
         self._baths = [_in_forms(bath, scene.treatment(bath)) for bath in scene.baths]
-        essential = "|".join(e.bath.boundary for e in self._baths if not isinstance(e.treatment, Penalty))
+        essential = "|".join(e.bath.boundary for e in self._baths if not isinstance(e.treatment, Weak))
         self.space = self.model.space(self.mesh, self.kinematics, scene.held(), essential)
-        self.fields = GridFunction(self.space)
         self.names = self.model.unknowns
+        with_multipliers = "|".join(e.bath.boundary for e in self._baths if isinstance(e.treatment, Multiplier))
+        if with_multipliers:
+            traces = Compress(H1(self.mesh, order=self.model.order - 1, definedon=self.mesh.Boundaries(with_multipliers)))
+            self.space = FESpace([*self.space.components, *(traces for _ in self.model.held)])
+            self.names += tuple(f"efflux of {balance}" for balance in self.model.held)
+        self.fields = GridFunction(self.space)
         spans = [self.space.Range(i) for i in range(len(self.names))]
         self.ranges = {name: slice(span.start, span.stop) for name, span in zip(self.names, spans, strict=True)}
         self.free = self._free_dofs()
@@ -100,11 +109,12 @@ class Problem:
         weight = next((load for load in scene.loads if isinstance(load, Weight)), None)
         bath = self._baths[0].fields if self._baths else None
 
-        def state(functions: Any) -> Any:
-            return self.model.state(functions, material, self.kinematics, self._charge, weight, bath)
-
-        self.terms = self.model.terms(state(trials), tests) + self._boundary_terms(state(trials), tests)
-        self.state = state(self.fields.components)
+        setting = Setting(material, self.kinematics, self._charge, weight, bath)
+        own = len(self.model.unknowns)  # the rest are multipliers
+        state = self.model.state(trials[:own], setting)
+        multipliers = list(zip(trials[own:], tests[own:], strict=True))
+        self.terms = self.model.terms(state, tests[:own]) + self._boundary_terms(state, tests, multipliers)
+        self.state = self.model.state(self.fields.components[:own], setting)
 
         self._system = BilinearForm(self.space)
         self._contents = BilinearForm(self.space)
@@ -119,16 +129,13 @@ class Problem:
 
     # -- forms ---------------------------------------------------------------------------------------------------------
 
-    def _boundary_terms(self, state: Any, tests: list) -> list[Term]:
+    def _boundary_terms(self, state: Any, tests: list, multipliers: list) -> list[Term]:
         terms = []
         for entry in self._baths:
-            if not isinstance(entry.treatment, Penalty):
-                continue
-            boundary = entry.bath.boundary
-            factors = entry.treatment.factors(self.scene.material, self.cell_size(boundary))
-            stretch = self.kinematics.area_stretch(state.u)
-            for balance, efflux in self.model.weak_terms(state, tests, entry.fields, factors).items():
-                terms.append(Term(balance, "efflux", efflux * stretch, boundary=boundary))
+            if isinstance(entry.treatment, Weak):
+                boundary = entry.bath.boundary
+                h = self.cell_size(boundary)
+                terms += weak_terms(entry.treatment, self.model, state, tests, entry.fields, boundary, h, multipliers)
         for load in self.scene.loads:
             if isinstance(load, Traction):
                 power = InnerProduct(CF(load.vector), tests[0])
@@ -139,7 +146,8 @@ class Problem:
         factor = self.kinematics.weight if factor is None else factor * self.kinematics.weight
         integrand = (factor * term.integrand).Compile()
         if term.boundary is not None:
-            return integrand * ds(definedon=self.mesh.Boundaries(term.boundary), bonus_intorder=BONUS_ORDER)
+            region = self.mesh.Boundaries(term.boundary)
+            return integrand * ds(definedon=region, bonus_intorder=BONUS_ORDER, skeleton=term.normal_derivatives)
         integral = integrand * dx(bonus_intorder=BONUS_ORDER)
         return Variation(integral) if term.kind == "energy" else integral
 
@@ -219,7 +227,7 @@ class Problem:
         """Degrees of freedom and values of p and c on the boundaries of strongly treated baths."""
         found = []
         for entry in self._baths:
-            if isinstance(entry.treatment, Penalty):
+            if isinstance(entry.treatment, Weak):
                 continue
             cfc = self._charges[entry.treatment.charge_of]
             for name, value in self.model.equilibrium(entry.fields, cfc, self.scene.material).items():
@@ -278,11 +286,13 @@ class Problem:
         length = float(np.linalg.norm(corners.max(axis=0) - corners.min(axis=0)))
         charge = scene.material.largest("cfc0", self.mesh) * max(map(abs, scene.charge.values))
         baths = [value for bath in scene.baths if bath.concentration for value in bath.concentration.values]
-        return self.model.references(max([charge, *baths]), scene.material.largest("mu", self.mesh), length)
+        own = self.model.references(max([charge, *baths]), scene.material.largest("mu", self.mesh), length)
+        multipliers = self.names[len(own) :]  # in the units of p and c
+        return own | {name: own[unknown] for name, unknown in zip(multipliers, self.model.held.values(), strict=False)}
 
     def worst(self, vector: NDArray) -> tuple[str, tuple[float, ...]]:
         """The unknown with the largest entry of `vector` in units of its reference, and the vertex [mm] where it is."""
-        name = max(self.names, key=lambda n: _largest(vector[self.ranges[n]]) / self.references[n])
+        name = max(self.model.unknowns, key=lambda n: _largest(vector[self.ranges[n]]) / self.references[n])
         part = np.abs(vector[self.ranges[name]])
         per_component = part.reshape(-1, len(part) // self._components(name))[:, : self.mesh.nv].max(axis=0)
         vertex = int(np.argmax(np.where(np.isfinite(per_component), per_component, np.inf)))

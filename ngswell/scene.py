@@ -250,7 +250,7 @@ class Scene:
             f"{type(self.model).__name__}, {type(self.kinematics).__name__}, order {self.model.order}, "
             f"{self.mesh.ne} elements, {problem.space.ndof} unknowns ({sizes})"
         ]
-        for balance in self.model.balances:
+        for balance in dict.fromkeys(term.balance for term in problem.terms):
             names = [
                 term.name + (f" on {term.boundary}" if term.boundary else "")
                 for term in problem.terms

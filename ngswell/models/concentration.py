@@ -10,13 +10,11 @@ from typing import ClassVar
 from ngsolve import H1, CoefficientFunction, FESpace, InnerProduct, Mesh, sqrt
 
 from ngswell import donnan, laws
-from ngswell.baths import Bath, BathFields, Frozen, Lagged, Penalty
-from ngswell.errors import InputError
+from ngswell.baths import Bath, BathFields, Frozen, Lagged, Multiplier, Nitsche, Penalty
 from ngswell.kinematics import Kinematics
-from ngswell.materials import Field, Material
+from ngswell.materials import Material
 from ngswell.models.mechanics import SolidState
-from ngswell.models.terms import Term, check_order
-from ngswell.supports import Weight
+from ngswell.models.terms import Setting, Term, check_order, needs_salt
 
 
 @dataclass(frozen=True)
@@ -78,7 +76,7 @@ class Concentration:
     balances: ClassVar[tuple[str, ...]] = ("momentum", "fluid", "cations", "charge")
     held: ClassVar[dict[str, str]] = {"fluid": "p", "cations": "c"}
     evolving: ClassVar[dict[str, float]] = {"u": 1e-2, "p": 1e-1, "c": 1e-1}  # cfc follows u
-    treatments: ClassVar[tuple[type, ...]] = (Penalty, Lagged, Frozen)
+    treatments: ClassVar[tuple[type, ...]] = (Penalty, Nitsche, Multiplier, Lagged, Frozen)
 
     def __post_init__(self) -> None:
         check_order("Concentration", self.order)
@@ -87,9 +85,7 @@ class Concentration:
         return Penalty(relative=1e4)
 
     def check(self, material: Material, baths: Sequence[Bath]) -> None:
-        for bath in baths:
-            if bath.c is None:
-                raise InputError(f"bath on {bath.boundary!r}: Concentration needs its salt concentration c [mol/l]")
+        needs_salt("Concentration", baths)
 
     def space(self, mesh: Mesh, kinematics: Kinematics, held: dict[str, str], essential: str) -> FESpace:
         V = kinematics.space(mesh, self.order, held)
@@ -97,16 +93,8 @@ class Concentration:
         Q_bath = H1(mesh, order=self.order - 1, dirichlet=essential)
         return FESpace([V, Q_bath, Q_bath, Q])
 
-    def state(
-        self,
-        functions: Sequence[CoefficientFunction],
-        material: Material,
-        kinematics: Kinematics,
-        charge: Field,
-        weight: Weight | None,
-        bath: BathFields | None,
-    ) -> State:
-        return State(material, kinematics, charge, weight, *functions)
+    def state(self, functions: Sequence[CoefficientFunction], setting: Setting) -> State:
+        return State(setting, *functions)
 
     def equilibrium(self, bath: BathFields, cfc: CoefficientFunction, material: Material) -> dict[str, CoefficientFunction]:
         m = material
@@ -120,7 +108,7 @@ class Concentration:
         s, m = state, state.material
         gradient = s.kinematics.flow_gradient
         flux = s.transport(s.pull)
-        reference_charge = s.charge * (1 - m.nS0) * m.cfc0
+        reference_charge = s.setting.charge * (1 - m.nS0) * m.cfc0
         return [
             *s.momentum(s.pore_pressure, v),
             Term("fluid", "storage", s.content * q, "rate"),
@@ -130,13 +118,9 @@ class Concentration:
             Term("charge", "projection", (s.content * s.cfc - reference_charge) * r),
         ]
 
-    def weak_terms(
-        self, state: State, tests: Sequence[CoefficientFunction], bath: BathFields, factors: tuple[Field, Field]
-    ) -> dict[str, CoefficientFunction]:
-        _, q, d, _ = tests
+    def excess(self, state: State, bath: BathFields) -> dict[str, CoefficientFunction]:
         wanted = self.equilibrium(bath, state.cfc, state.material)
-        for_p, for_c = factors
-        return {"fluid": for_p * (state.p - wanted["p"]) * q, "cations": for_c * (state.c - wanted["c"]) * d}
+        return {"fluid": state.p - wanted["p"], "cations": state.c - wanted["c"]}
 
     def references(self, concentration: float, stress: float, length: float) -> dict[str, float]:
         return {"u": length, "p": stress, "c": concentration, "cfc": concentration}

@@ -12,20 +12,23 @@ from ngsolve import CoefficientFunction
 from ngswell import donnan, laws
 from ngswell.baths import Bath, BathFields
 from ngswell.errors import InputError
-from ngswell.kinematics import Kinematics
-from ngswell.materials import Field, Material
+from ngswell.materials import Material
 from ngswell.models.mechanics import SolidState
 from ngswell.models.one_pressure import OnePressure
+from ngswell.models.terms import Setting
 from ngswell.schedules import Blend
-from ngswell.supports import Weight
 
 
 @dataclass(frozen=True)
 class State(SolidState):
     """Displacement and hydraulic pressure P; the ions follow from the charge at the point and the bath."""
 
-    bath: BathFields
     P: CoefficientFunction
+
+    @property
+    def bath(self) -> BathFields:
+        assert self.setting.bath is not None, "the model refuses scenes without a bath"
+        return self.setting.bath
 
     @property
     def pressure(self) -> CoefficientFunction:
@@ -100,13 +103,5 @@ class LocalDonnan(OnePressure):
                     "LocalDonnan has the ions in equilibrium with one bath; use Concentration"
                 )
 
-    def state(
-        self,
-        functions: Sequence[CoefficientFunction],
-        material: Material,
-        kinematics: Kinematics,
-        charge: Field,
-        weight: Weight | None,
-        bath: BathFields | None,
-    ) -> State:
-        return State(material, kinematics, charge, weight, functions[0], bath, functions[1])  # type: ignore[arg-type]
+    def state(self, functions: Sequence[CoefficientFunction], setting: Setting) -> State:
+        return State(setting, *functions)

@@ -10,19 +10,23 @@ from ngsolve import CoefficientFunction, Cof, Det, Id, InnerProduct, Inv
 from ngswell import laws
 from ngswell.kinematics import Kinematics
 from ngswell.materials import Field, Material
-from ngswell.models.terms import Term
-from ngswell.supports import Weight
+from ngswell.models.terms import Setting, Term
 
 
 @dataclass(frozen=True)
 class SolidState:
     """The deformed solid, of trial functions or of a result. A model adds its fields and `pore_pressure` [N/mm²]."""
 
-    material: Material
-    kinematics: Kinematics
-    charge: Field
-    weight: Weight | None
+    setting: Setting
     u: CoefficientFunction
+
+    @property
+    def material(self) -> Material:
+        return self.setting.material
+
+    @property
+    def kinematics(self) -> Kinematics:
+        return self.setting.kinematics
 
     @cached_property
     def F(self) -> CoefficientFunction:
@@ -68,14 +72,14 @@ class SolidState:
     @cached_property
     def pointwise_charge(self) -> CoefficientFunction:
         """cfc(J) at the point [mol/l]."""
-        return laws.fixed_charge(self.J, self.material, self.charge)
+        return laws.fixed_charge(self.J, self.material, self.setting.charge)
 
     def drive(self, pressure: CoefficientFunction) -> CoefficientFunction:
         """Reference gradient of a pressure, less the pulled-back weight of the fluid [N/mm³]."""
         gradient = self.kinematics.flow_gradient(pressure)
-        if self.weight is None:
+        if self.setting.weight is None:
             return gradient
-        return gradient - self.F.trans * self.kinematics.flow_vector(self.weight.fluid)
+        return gradient - self.F.trans * self.kinematics.flow_vector(self.setting.weight.fluid)
 
     def momentum(self, pore_pressure: CoefficientFunction, v: CoefficientFunction) -> list[Term]:
         """Momentum balance (16) with the extra stress (18) from its energy."""
@@ -84,8 +88,9 @@ class SolidState:
             Term("momentum", "solid", laws.solid_energy(self.F, self.material), "energy"),
             Term("momentum", "pore pressure", -pore_pressure * power),
         ]
-        if self.weight is not None:
-            solid, fluid = (CoefficientFunction(vector) for vector in (self.weight.solid, self.weight.fluid))
+        weight = self.setting.weight
+        if weight is not None:
+            solid, fluid = (CoefficientFunction(vector) for vector in (weight.solid, weight.fluid))
             force = self.material.nS0 * solid + self.content * fluid
             terms.append(Term("momentum", "weight", -InnerProduct(force, v)))
         return terms

@@ -10,7 +10,7 @@ from ngsolve import H1, CoefficientFunction, FESpace, InnerProduct, Mesh
 
 from ngswell.baths import BathFields, Essential, Penalty
 from ngswell.kinematics import Kinematics
-from ngswell.materials import Field, Material
+from ngswell.materials import Material
 from ngswell.models.terms import Term, check_order
 
 
@@ -49,10 +49,8 @@ class OnePressure:
             Term("fluid", "seepage", -InnerProduct(flux, state.kinematics.flow_gradient(q))),
         ]
 
-    def weak_terms(
-        self, state: Any, tests: Sequence[CoefficientFunction], bath: BathFields, factors: tuple[Field, Field]
-    ) -> dict[str, CoefficientFunction]:
-        return {"fluid": factors[0] * (state.pressure - bath.P) * tests[1]}
+    def excess(self, state: Any, bath: BathFields) -> dict[str, CoefficientFunction]:
+        return {"fluid": state.pressure - bath.P}
 
     def references(self, concentration: float, stress: float, length: float) -> dict[str, float]:
         return {"u": length, self.unknowns[1]: stress}

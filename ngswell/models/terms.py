@@ -8,7 +8,7 @@ from typing import Any, ClassVar, Literal, Protocol
 
 from ngsolve import CoefficientFunction, FESpace, Mesh
 
-from ngswell.baths import BathFields, Treatment
+from ngswell.baths import Bath, BathFields, Treatment
 from ngswell.errors import InputError
 from ngswell.kinematics import Kinematics
 from ngswell.materials import Field, Material
@@ -20,7 +20,8 @@ class Term:
     """One named term of one balance.
 
     `kind` is "rate" (a content whose time derivative enters), "energy" (a density whose variation enters) or "form" (an
-    integrand linear in the test functions). Integrated over `boundary` if that is named, else over the body.
+    integrand linear in the test functions). Integrated over `boundary` if that is named, else over the body. On a boundary,
+    fields have tangential derivatives only, unless the term asks for `normal_derivatives`.
     """
 
     balance: str
@@ -28,9 +29,21 @@ class Term:
     integrand: CoefficientFunction
     kind: Literal["rate", "energy", "form"] = "form"
     boundary: str | None = None
+    normal_derivatives: bool = False
 
     def __str__(self) -> str:
         return f"{self.balance}: {self.name}" + (f" [{self.boundary}]" if self.boundary else "")
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What the fields of a model live in: parameters and motion, the factor on cfc0, the weight, and the first bath."""
+
+    material: Material
+    kinematics: Kinematics
+    charge: Field
+    weight: Weight | None
+    bath: BathFields | None
 
 
 class Model(Protocol):
@@ -51,7 +64,7 @@ class Model(Protocol):
 
     def default_treatment(self) -> Treatment: ...
 
-    def check(self, material: Material, baths: Sequence[Any]) -> None:
+    def check(self, material: Material, baths: Sequence[Bath]) -> None:
         """Refuse materials and baths that the model cannot mean."""
         ...
 
@@ -59,15 +72,7 @@ class Model(Protocol):
         """Product space. `held` maps a direction to boundaries where u vanishes; on `essential` baths prescribe values."""
         ...
 
-    def state(
-        self,
-        functions: Sequence[CoefficientFunction],
-        material: Material,
-        kinematics: Kinematics,
-        charge: Field,
-        weight: Weight | None,
-        bath: BathFields | None,
-    ) -> Any:
+    def state(self, functions: Sequence[CoefficientFunction], setting: Setting) -> Any:
         """The fields that `functions` (trial functions or components of a result, one an unknown) stand for."""
         ...
 
@@ -79,10 +84,8 @@ class Model(Protocol):
         """The balances over the body, pulled back to the reference configuration."""
         ...
 
-    def weak_terms(
-        self, state: Any, tests: Sequence[CoefficientFunction], bath: BathFields, factors: tuple[Field, Field]
-    ) -> dict[str, CoefficientFunction]:
-        """Weakly imposed equilibrium: efflux per current area, tested, by balance; `factors` for p and for c."""
+    def excess(self, state: Any, bath: BathFields) -> dict[str, CoefficientFunction]:
+        """By how much unknowns exceed their equilibrium with a bath, by the balance that gets the efflux."""
         ...
 
     def references(self, concentration: float, stress: float, length: float) -> dict[str, float]:
@@ -92,6 +95,13 @@ class Model(Protocol):
     def bounds(self, state: Any) -> dict[str, CoefficientFunction]:
         """Fields that have to stay positive, by name."""
         ...
+
+
+def needs_salt(model: str, baths: Sequence[Bath]) -> None:
+    """Refuse baths without a salt concentration."""
+    for bath in baths:
+        if bath.c is None:
+            raise InputError(f"bath on {bath.boundary!r}: {model} needs its salt concentration c [mol/l]")
 
 
 def check_order(model: str, order: int) -> None:

@@ -8,13 +8,12 @@ from typing import ClassVar
 
 from ngsolve import CoefficientFunction
 
-from ngswell.baths import Bath, BathFields
+from ngswell.baths import Bath
 from ngswell.errors import InputError
-from ngswell.kinematics import Kinematics
-from ngswell.materials import Field, Material
+from ngswell.materials import Material
 from ngswell.models.mechanics import SolidState
 from ngswell.models.one_pressure import OnePressure
-from ngswell.supports import Weight
+from ngswell.models.terms import Setting
 
 
 @dataclass(frozen=True)
@@ -59,13 +58,5 @@ class Uncharged(OnePressure):
             if bath.c is not None:
                 raise InputError(f"bath on {bath.boundary!r}: Uncharged has no ions, so it takes no concentration c")
 
-    def state(
-        self,
-        functions: Sequence[CoefficientFunction],
-        material: Material,
-        kinematics: Kinematics,
-        charge: Field,
-        weight: Weight | None,
-        bath: BathFields | None,
-    ) -> State:
-        return State(material, kinematics, charge, weight, *functions)
+    def state(self, functions: Sequence[CoefficientFunction], setting: Setting) -> State:
+        return State(setting, *functions)

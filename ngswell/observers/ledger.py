@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ngswell.baths import Penalty
+from ngswell.baths import Weak
 from ngswell.observers.base import Observer
 from ngswell.problem import Problem
 from ngswell.stepping import StepReport
@@ -40,7 +40,7 @@ class Ledger(Observer):
         self._reactions: list[tuple[str, str, NDArray]] = []
         taken = np.zeros(problem.mesh.nv, dtype=bool)
         for bath in problem.scene.baths:
-            if not isinstance(problem.scene.treatment(bath), Penalty):
+            if not isinstance(problem.scene.treatment(bath), Weak):
                 region = problem.mesh.Boundaries(bath.boundary)
                 mine = sorted({v.nr for element in region.Elements() for v in element.vertices if not taken[v.nr]})
                 taken[mine] = True

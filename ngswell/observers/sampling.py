@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from ngsolve import BND, CF, BoundaryFromVolumeCF, CoefficientFunction, Integrate, Norm, specialcf
+from ngsolve import BND, CF, BoundaryFromVolumeCF, CoefficientFunction, Integrate, Norm
 from numpy.typing import NDArray
 
 from ngswell.errors import InputError
@@ -72,9 +72,7 @@ class Integral(Observer):
         else:
             problem.scene.check_boundary("Integral", self.boundary)
             cofactor = BoundaryFromVolumeCF(problem.state.cofactor)
-            components = specialcf.normal(problem.mesh.dim)
-            normal = problem.kinematics.flow_vector(tuple(components[i] for i in range(problem.mesh.dim)))
-            stretch = Norm(cofactor * normal) if problem.mesh.dim > 1 else CF(1.0)
+            stretch = Norm(cofactor * problem.kinematics.normal) if problem.mesh.dim > 1 else CF(1.0)
             self._density = BoundaryFromVolumeCF(quantity) * stretch * problem.kinematics.weight
             self._region = {"mesh": problem.mesh, "VOL_or_BND": BND, "definedon": problem.mesh.Boundaries(self.boundary)}
         super().start(problem, begin, until)

@@ -89,7 +89,7 @@ def test_material_field_out_of_range_is_found_on_the_mesh():
         ({"baths": [Bath("top", c=0.15), Bath("bottom", c=0.2)]}, "differ at the start"),
         ({"charge": Ramp((0, -1.0))}, "charge factor"),
         ({"baths": [Bath("top", P=0.1)]}, "Concentration needs its salt concentration"),
-        ({"baths": [Bath("top", c=0.15, treatment=Essential())]}, "it has Penalty, Lagged, Frozen"),
+        ({"baths": [Bath("top", c=0.15, treatment=Essential())]}, "it has Penalty, Nitsche, Multiplier, Lagged, Frozen"),
         ({"initial": (None, 0.0)}, "needs a salt concentration"),
         ({"model": Uncharged()}, "cfc0"),
         ({"model": Uncharged(), "material": UNCHARGED}, "takes no concentration"),

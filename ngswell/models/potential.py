@@ -1,0 +1,131 @@
+"""The same physics in unknowns that are continuous across a bath's boundary: exact baths, no charge field."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import ClassVar
+
+from ngsolve import H1, CoefficientFunction, FESpace, InnerProduct, Mesh, exp, log
+
+from ngswell import donnan, laws
+from ngswell.baths import Bath, BathFields, Essential, Penalty
+from ngswell.kinematics import Kinematics
+from ngswell.materials import Material
+from ngswell.models.mechanics import SolidState
+from ngswell.models.terms import Setting, Term, check_order, needs_salt
+
+
+@dataclass(frozen=True)
+class State(SolidState):
+    """Displacement, and the bath (P, c̃) with which the point would be in equilibrium."""
+
+    P: CoefficientFunction
+    salt: CoefficientFunction
+    """The unknown: c̃, or ln c̃."""
+    logarithm: bool
+
+    @cached_property
+    def bath(self) -> CoefficientFunction:
+        """c̃ [mol/l]."""
+        return exp(self.salt) if self.logarithm else self.salt
+
+    @cached_property
+    def pore_pressure(self) -> CoefficientFunction:
+        """Overall pressure p, eq. (38) for that bath and the charge at the point [N/mm²]."""
+        m = self.material
+        return donnan.pressure(self.bath, self.pointwise_charge, m.RT, self.P, m.Gamma, m.phi, m.phi_bath)
+
+    @cached_property
+    def cations(self) -> CoefficientFunction:
+        """c₊ of (23)₁ for that bath [mol/l]."""
+        return donnan.cations(self.bath, self.pointwise_charge, self.material.Gamma)
+
+    @cached_property
+    def anions(self) -> CoefficientFunction:
+        """c₋ [mol/l]."""
+        return donnan.anions(self.bath, self.pointwise_charge, self.material.Gamma)
+
+    def transport(self, frame: CoefficientFunction) -> laws.Transport:
+        """Fluxes from gradients in the `frame` (a matrix on reference gradients): `pull` or `push`."""
+        gradient = self.kinematics.flow_gradient(self.salt)
+        grad_bath = self.bath * gradient if self.logarithm else gradient
+        return laws.transport_by_potentials(
+            self.material, self.nF, self.bath, self.pointwise_charge, frame * self.drive(self.P), frame * grad_bath
+        )
+
+    def outputs(self) -> dict[str, CoefficientFunction]:
+        """Named fields in the current configuration; `ngswell.models.OUTPUT_UNITS` has their units."""
+        flux = self.transport(self.push)
+        return {
+            **self.solid_outputs(self.pore_pressure),
+            "p": self.pore_pressure,
+            "hydraulic_pressure": self.P - 2 * self.material.phi_bath * self.material.RT * self.bath,
+            "c_plus": self.cations,
+            "c_minus": self.anions,
+            "cfc": self.pointwise_charge,
+            "seepage": flux.fluid,
+            "cation_flux": flux.cations,
+        }
+
+
+@dataclass(frozen=True)
+class Potential:
+    """Unknowns u (order k), P and c̃ (order k − 1): hydraulic pressure and salt concentration of a virtual bath.
+
+    c̃ and P are those of the bath with which the point would be in Donnan equilibrium: c₊ c₋ = (Γ c̃)² and p = p_D(c̃, cfc, P),
+    eqs. (23), (38). They stand for the chemical potentials of salt and fluid. A bath prescribes them whatever the
+    deformation, and no gradient of the charge is left; ions and overall pressure follow from the charge at the point.
+    `logarithm` makes ln c̃ the third unknown, which keeps c̃ positive.
+    """
+
+    order: int = 2
+    logarithm: bool = False
+
+    unknowns: ClassVar[tuple[str, ...]] = ("u", "P", "salt")
+    balances: ClassVar[tuple[str, ...]] = ("momentum", "fluid", "cations")
+    held: ClassVar[dict[str, str]] = {"fluid": "P", "cations": "salt"}
+    evolving: ClassVar[dict[str, float]] = {"u": 1e-2, "P": 1e-1, "salt": 1e-1}
+    treatments: ClassVar[tuple[type, ...]] = (Essential, Penalty)
+
+    def __post_init__(self) -> None:
+        check_order("Potential", self.order)
+
+    def default_treatment(self) -> Essential:
+        return Essential()
+
+    def check(self, material: Material, baths: Sequence[Bath]) -> None:
+        needs_salt("Potential", baths)
+
+    def space(self, mesh: Mesh, kinematics: Kinematics, held: dict[str, str], essential: str) -> FESpace:
+        Q = H1(mesh, order=self.order - 1, dirichlet=essential)
+        return FESpace([kinematics.space(mesh, self.order, held), Q, Q])
+
+    def state(self, functions: Sequence[CoefficientFunction], setting: Setting) -> State:
+        u, P, salt = functions
+        return State(setting, u, P, salt, self.logarithm)
+
+    def equilibrium(self, bath: BathFields, cfc: CoefficientFunction, material: Material) -> dict[str, CoefficientFunction]:
+        return {"P": bath.P, "salt": log(bath.c) if self.logarithm else bath.c}
+
+    def terms(self, state: State, tests: Sequence[CoefficientFunction]) -> list[Term]:
+        v, q, d = tests
+        gradient = state.kinematics.flow_gradient
+        flux = state.transport(state.pull)
+        return [
+            *state.momentum(state.pore_pressure, v),
+            Term("fluid", "storage", state.content * q, "rate"),
+            Term("fluid", "seepage", -InnerProduct(flux.fluid, gradient(q))),
+            Term("cations", "storage", state.content * state.cations * d, "rate"),
+            Term("cations", "diffusion and convection", -InnerProduct(flux.cations, gradient(d))),
+        ]
+
+    def excess(self, state: State, bath: BathFields) -> dict[str, CoefficientFunction]:
+        return {"fluid": state.P - bath.P, "cations": state.bath - bath.c}
+
+    def references(self, concentration: float, stress: float, length: float) -> dict[str, float]:
+        return {"u": length, "P": stress, "salt": 1.0 if self.logarithm else concentration}
+
+    def bounds(self, state: State) -> dict[str, CoefficientFunction]:
+        return {"fluid content J − nS0": state.content, "salt concentration c̃": state.bath}
