@@ -7,12 +7,13 @@ enters: weakly, as an efflux, or as prescribed values with a charge known before
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple, TypeAlias
+from typing import ClassVar, NamedTuple, TypeAlias
 
 from ngsolve import CoefficientFunction
 
 from ngswell.errors import InputError
 from ngswell.materials import Field, Material
+from ngswell.sampling_rules import SamplingRule
 from ngswell.schedules import Schedule, schedule
 
 
@@ -105,12 +106,23 @@ class Multiplier:
 
 @dataclass(frozen=True)
 class Lagged:
-    """Prescribed values with the boundary charge of the last accepted step: the scheme that oscillates (Fig. 8, upper)."""
+    """Prescribed values with the charge of the last accepted step: the scheme that oscillates (Fig. 8, upper).
 
-    charge_of = "last"
+    Without a `rule` the charge at the boundary itself; else sampled: `Lagged(InnerLayer())`, `Lagged(Averaged())`,
+    `Lagged(LeastSquares())` are the remedies that the paper lists. `ngswell.stability.growth_factor` says whether a scene
+    is stable with them.
+    """
+
+    rule: SamplingRule | None = None
+
+    charge_of: ClassVar[str] = "last"
+
+    def __post_init__(self) -> None:
+        if self.rule is not None and (isinstance(self.rule, type) or not isinstance(self.rule, SamplingRule)):
+            raise InputError(f"Lagged: rule {self.rule!r} is none of InnerLayer(), Averaged(), LeastSquares(...)")
 
     def __str__(self) -> str:
-        return "prescribed with the charge of the last step"
+        return "prescribed with the charge of the last step" + (f", {self.rule}" if self.rule is not None else "")
 
 
 @dataclass(frozen=True)

@@ -30,9 +30,10 @@ from ngsolve import (
 )
 from numpy.typing import NDArray
 
-from ngswell.baths import Bath, BathFields, Multiplier, Treatment, Weak
+from ngswell.baths import Bath, BathFields, Lagged, Multiplier, Treatment, Weak
 from ngswell.models.terms import Setting, Term
 from ngswell.quadrature import points, vertices
+from ngswell.sampling_rules import BathBoundary, Slopes
 from ngswell.schedules import Signal
 from ngswell.supports import Traction, Weight
 from ngswell.weak import weak_terms
@@ -103,6 +104,7 @@ class Problem:
         self.free = self._free_dofs()
 
         self.dt = Parameter(1.0)
+        self.time = scene.start
         self._charge = Parameter(scene.charge.at(scene.start))
 
         trials, tests = (list(functions) for functions in self.space.TnT())
@@ -179,6 +181,7 @@ class Problem:
 
     def set_time(self, time: float, charge_share: float = 1.0) -> None:
         """Move every schedule to `time` [s]; `charge_share` of the charge, for continuation."""
+        self.time = time
         self._charge.Set(charge_share * self.scene.charge.at(time))
         for entry in self._baths:
             entry.set(time)
@@ -229,13 +232,31 @@ class Problem:
         for entry in self._baths:
             if isinstance(entry.treatment, Weak):
                 continue
-            cfc = self._charges[entry.treatment.charge_of]
+            cfc = self._sampled(self._charges[entry.treatment.charge_of], entry)
             for name, value in self.model.equilibrium(entry.fields, cfc, self.scene.material).items():
                 on_boundary = GridFunction(self._component(name).space)
                 on_boundary.Set(value, definedon=self.mesh.Boundaries(entry.bath.boundary))
                 dofs = self._boundary_dofs(name, entry.bath.boundary)
                 found.append((self.ranges[name].start + dofs, on_boundary.vec.FV().NumPy()[dofs]))
         return found
+
+    def _sampled(self, charge: Any, entry: _BathInForms) -> Any:
+        """The charge that a bath's prescribed values follow: `charge` itself, or what a `Lagged` rule makes of it."""
+        rule = entry.treatment.rule if isinstance(entry.treatment, Lagged) else None
+        if rule is None:
+            return charge
+        boundary = self._bath_boundary(entry.bath.boundary)
+        wanted = self.model.equilibrium(entry.fields, charge, self.scene.material)
+        slopes = Slopes(*(boundary.values(wanted[name].Diff(charge)) for name in ("p", "c")))
+        sampled = GridFunction(charge.space)  # its first coefficients are the values at the vertices
+        at_vertices = charge.vec.FV().NumPy()[: self.mesh.nv]
+        sampled.vec.FV().NumPy()[boundary.vertices] = rule.sample(at_vertices, boundary, slopes)
+        return sampled
+
+    @cache  # noqa: B019  # a scene keeps its problem anyway
+    def _bath_boundary(self, boundary: str) -> BathBoundary:
+        baths = "|".join(entry.bath.boundary for entry in self._baths)
+        return BathBoundary(self.mesh, boundary, baths, self.kinematics.weight)
 
     @cache  # noqa: B019  # a scene keeps its problem anyway
     def _boundary_dofs(self, name: str, boundary: str) -> NDArray:
