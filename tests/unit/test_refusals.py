@@ -23,6 +23,7 @@ from ngswell import (
     Ledger,
     LocalDonnan,
     Material,
+    NgswellError,
     OutputError,
     Penalty,
     Pin,
@@ -173,11 +174,16 @@ def test_a_snapshot_of_another_scene():
         strip().run(2.0, Fixed(1.0), resume=end)
 
 
-def test_growth_needs_a_step_and_an_equilibrium():
+def test_growth_needs_a_step_and_a_state_of_its_scene():
     with pytest.raises(InputError, match="positive"):
         growth_factor(strip(Frozen()), 0.0)
-    with pytest.raises(InputError, match="no equilibrium"):
-        growth_factor(strip(loads=[]), 1.0)
+    end = confined_column().run(1.0, Fixed(1.0)).end
+    with pytest.raises(InputError, match="unknowns"):
+        growth_factor(strip(Frozen()), 1.0, end)
+    with pytest.raises(NgswellError, match="does not succeed"):  # crushed: nothing to linearise about
+        growth_factor(strip(loads=[Traction("top", (0.0, -100.0))]), 1e3)
+    with pytest.raises(NgswellError, match="most_steps"):
+        growth_factor(strip(Frozen()), 1e-3, most_steps=40)
 
 
 def test_output_that_cannot_be_written(tmp_path):
