@@ -174,6 +174,11 @@ class Problem:
             free.Clear(dof)
         return free
 
+    @property
+    def baths(self) -> dict[str, BathFields]:
+        """The baths at the clock's time, by boundary."""
+        return {entry.bath.boundary: entry.fields for entry in self._baths}
+
     # -- clock and states ----------------------------------------------------------------------------------------------
 
     def _component(self, name: str) -> GridFunction:

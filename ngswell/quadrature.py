@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from ngsolve import ET, VOL, IntegrationRule, Mesh
+from ngsolve import BND, ET, VOL, BoundaryFromVolumeCF, CoefficientFunction, Integrate, IntegrationRule, Mesh
 from numpy.typing import NDArray
 
 _SHAPES = (ET.SEGM, ET.TRIG, ET.QUAD, ET.TET, ET.HEX, ET.PRISM, ET.PYRAMID)
@@ -12,6 +12,16 @@ _SHAPES = (ET.SEGM, ET.TRIG, ET.QUAD, ET.TET, ET.HEX, ET.PRISM, ET.PYRAMID)
 def points(mesh: Mesh, region: object = VOL, order: int = 4) -> NDArray:
     """Mapped integration points of degree `order` on all elements of `region`; any CoefficientFunction takes them."""
     return mesh.MapToAllElements({shape: IntegrationRule(shape, order) for shape in _SHAPES}, region)
+
+
+def integral_on_boundary(
+    mesh: Mesh, field: CoefficientFunction, boundary: str, order: int, measure: CoefficientFunction | float = 1.0
+) -> float:
+    """Integral of a field of the body, its derivatives included, times `measure` over a boundary; in 1-d, its values' sum."""
+    region = mesh.Boundaries(boundary)
+    if mesh.dim == 1:  # NGSolve's traces of derivatives need a boundary with area
+        return sum(field(mesh(*mesh[element.vertices[0]].point)) for element in region.Elements())
+    return Integrate(BoundaryFromVolumeCF(field) * measure, mesh, BND, definedon=region, order=order)
 
 
 def vertices(mesh: Mesh) -> NDArray:

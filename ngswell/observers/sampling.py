@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from ngsolve import BND, CF, BoundaryFromVolumeCF, CoefficientFunction, Integrate, Norm
+from ngsolve import CF, BoundaryFromVolumeCF, CoefficientFunction, Integrate, Norm
 from numpy.typing import NDArray
 
 from ngswell.errors import InputError
 from ngswell.observers.base import Observer
 from ngswell.problem import Problem, Snapshot
+from ngswell.quadrature import integral_on_boundary
 
 
 def _output(problem: Problem, name: str) -> CoefficientFunction:
@@ -66,19 +67,21 @@ class Integral(Observer):
 
     def start(self, problem: Problem, begin: float, until: float) -> None:
         quantity = CF(1.0) if self.quantity is None else _output(problem, self.quantity)
-        if self.boundary is None:
-            self._density = (quantity * problem.state.J * problem.kinematics.weight).Compile()
-            self._region = {"mesh": problem.mesh}
-        else:
+        self._quantity, self._measure = quantity, problem.state.J * problem.kinematics.weight
+        if self.boundary is not None:
             problem.scene.check_boundary("Integral", self.boundary)
             cofactor = BoundaryFromVolumeCF(problem.state.cofactor)
-            stretch = Norm(cofactor * problem.kinematics.normal) if problem.mesh.dim > 1 else CF(1.0)
-            self._density = BoundaryFromVolumeCF(quantity) * stretch * problem.kinematics.weight
-            self._region = {"mesh": problem.mesh, "VOL_or_BND": BND, "definedon": problem.mesh.Boundaries(self.boundary)}
+            self._measure = Norm(cofactor * problem.kinematics.normal) * problem.kinematics.weight
+        else:
+            self._density = (quantity * self._measure).Compile()
         super().start(problem, begin, until)
 
     def record(self, problem: Problem, time: float) -> None:
-        self._values.append(Integrate(self._density, order=2 * problem.model.order + 2, **self._region))
+        mesh, order = problem.mesh, 2 * problem.model.order + 2
+        if self.boundary is None:
+            self._values.append(Integrate(self._density, mesh, order=order))
+        else:
+            self._values.append(integral_on_boundary(mesh, self._quantity, self.boundary, order, self._measure))
 
     @property
     def values(self) -> NDArray:

@@ -20,6 +20,7 @@ from ngswell import (
     Lagged,
     Ledger,
     Penalty,
+    Potential,
     Probe,
     Progress,
     Ramp,
@@ -124,3 +125,11 @@ def test_steps_report_their_work():
     assert all(step.iterations >= 1 and step.dt > 0 for step in result.steps)
     assert sum(step.dt for step in result.steps) == pytest.approx(10.0, rel=1e-12)
     assert result.iterations == sum(step.iterations for step in result.steps)
+
+
+@pytest.mark.parametrize("model", [Concentration(), Potential()])
+def test_integral_over_the_end_of_a_column_is_the_value_there(model):
+    end, probe = Integral("p", boundary="top"), Probe((0.5,), "p")
+    confined_column(None, c=Ramp((0, 0.15), (10, 0.125)), cells=4, model=model).run(10.0, Fixed(5.0), [end, probe])
+    assert end.values == pytest.approx(probe.values["p"], rel=1e-14)
+    assert np.ptp(end.values) > 0

@@ -1,0 +1,432 @@
+"""Every treatment of the bath's boundary, in both models: stability, error, cost.
+
+Three scenes: the column of Fig. 4 and the strip of Fig. 8, both under the bath of Fig. 4 (0.15 to 0.125 mol/l in 10 s), and
+the free-swelling block from rest at 7000 s to 7224 s. Every run of a scene takes the same time steps as its reference, the
+potential model on a finer, graded mesh of order 3, so that what differs is the boundary and the mesh. Penalties and γ run
+over fourteen decades, in units of K/h for p and of D₊/h for c. The CSV has every run:
+
+- `error`: largest difference to the reference over time, of the top's displacement over its last value (column, strip) or of
+  the area over that at 7000 s (block);
+- `condition`: largest L2 distance over time of p and c on the bath's boundary from Donnan equilibrium with the charge there,
+  relative to p_D and c_D;
+- `iterations`, `rejected`, `seconds`: Newton iterations, rejected steps, seconds of the time loop;
+- `growth`: dominant eigenvalue of one step about the state at the start (strip); beyond ±1 the treatment is unstable;
+- `outcome`: "passes", or the time at which a step failed, or passed with less than a sixteenth of its size only [s].
+
+Numbers (SCENE is column, strip or block; TREATMENT its name in the CSV; on the middle mesh unless stated):
+
+- `SCENE_TREATMENT_plateau`: smallest error over the decades; `..._from`, `..._to`: the range of ε or γ (units of K/h) whose
+  error is within 10 % of it; treatments without parameter have `SCENE_TREATMENT_error`;
+- `SCENE_TREATMENT_condition`: distance from the condition at the plateau (the smallest over the decades);
+- `SCENE_TREATMENT_failures`: runs that fail, of all meshes and decades;
+- `strip_TREATMENT_growth`: largest |growth| over the decades;
+- `SCENE_reference_error`: distance between the reference and one on a mesh 1.5 times coarser;
+- `SCENE_paper_over_K_h`, `SCENE_paper_over_D_h`: the paper's ε on its mesh, in units of K/h and of D₊/h.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from ngsolve import Mesh
+from numpy.typing import NDArray
+from tqdm import tqdm
+
+from ngswell import (
+    TABLE_1,
+    TABLE_2,
+    Area,
+    Averaged,
+    Concentration,
+    Essential,
+    Fixed,
+    Frozen,
+    InnerLayer,
+    Lagged,
+    LeastSquares,
+    Multiplier,
+    Nitsche,
+    Penalty,
+    Potential,
+    Probe,
+    Result,
+    Scene,
+    StepError,
+    column,
+    donnan,
+    rectangle,
+)
+from ngswell.baths import Treatment
+from ngswell.models import Model
+from ngswell.observers.base import Observer
+from ngswell.problem import Problem, Snapshot
+from ngswell.quadrature import integral_on_boundary
+from ngswell.stability import growth_factor
+from ngswell.stepping import StepReport
+from studies import boundary_charge, free_swelling, oscillation
+from studies.output import Findings, cost
+
+DECADES = (1e-2, 1e-1, 1.0, 1e1, 1e2, 1e4, 1e6, 1e9, 1e12)
+QUICK_DECADES = (1e-1, 1e4)
+COARSENING = 1.5
+
+Make = Callable[[Any], Treatment]
+
+
+@dataclass(frozen=True)
+class Choice:
+    """A model with a treatment, or with a family of them over a penalty in units of K/h."""
+
+    model: Model
+    make: Make
+    swept: bool = True
+
+    def over(self, quick: bool) -> Sequence[float | None]:
+        """The values to run."""
+        return (QUICK_DECADES if quick else DECADES) if self.swept else (None,)
+
+
+def fixed(model: Model, treatment: Treatment) -> Choice:
+    return Choice(model, lambda _: treatment, swept=False)
+
+
+CHOICES: dict[str, Choice] = {
+    "penalty": Choice(Concentration(), lambda e: Penalty(relative=e)),
+    "nitsche": Choice(Concentration(), lambda e: Nitsche(e)),
+    "nitsche skew": Choice(Concentration(), lambda e: Nitsche(e, "skew")),
+    "nitsche without adjoint": Choice(Concentration(), lambda e: Nitsche(e, "none")),
+    "potential penalty": Choice(Potential(), lambda e: Penalty(relative=e)),
+    "nitsche skew without penalty": fixed(Concentration(), Nitsche(0.0, "skew")),
+    "multiplier": fixed(Concentration(), Multiplier()),
+    "potential essential": fixed(Potential(), Essential()),
+    "potential logarithm": fixed(Potential(logarithm=True), Essential()),
+    "lagged": fixed(Concentration(), Lagged()),
+    "lagged inner layer": fixed(Concentration(), Lagged(InnerLayer())),
+    "lagged averaged": fixed(Concentration(), Lagged(Averaged())),
+    "lagged least squares": fixed(Concentration(), Lagged(LeastSquares())),
+    "frozen": fixed(Concentration(), Frozen()),
+}
+
+
+class Condition(Observer):
+    """How far p and c on the baths' boundaries are from Donnan equilibrium with the charge there; L2, relative."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.values: list[float] = []
+
+    def record(self, problem: Problem, time: float) -> None:
+        outputs, m = problem.state.outputs(), problem.scene.material
+        off = {"p": 0.0, "c": 0.0}
+        size = {"p": 0.0, "c": 0.0}
+        for boundary, bath in problem.baths.items():
+            wanted = {
+                "p": donnan.pressure(bath.c, outputs["cfc"], m.RT, bath.P),
+                "c": donnan.cations(bath.c, outputs["cfc"]),
+            }
+            for name, output in (("p", "p"), ("c", "c_plus")):
+                difference = outputs[output] - wanted[name]
+                off[name] += integral_on_boundary(problem.mesh, difference * difference, boundary, 6)
+                size[name] += integral_on_boundary(problem.mesh, wanted[name] * wanted[name], boundary, 6)
+        self.values.append(float(max(np.sqrt(off[name] / size[name]) for name in off)))
+
+
+class Patience(Observer):
+    """Ends a run whose step had to be divided by more than sixteen: it would creep on for hours."""
+
+    def record(self, problem: Problem, time: float) -> None:
+        pass
+
+    def observe(self, problem: Problem, report: StepReport) -> None:
+        if len(report.rejected) > 2:
+            raise StepError(report.time, report.dt, "", (), f"{len(report.rejected)} rejections", "")
+
+
+@dataclass(frozen=True)
+class Case:
+    """A scene on meshes from coarse to fine, its steps, and what is compared."""
+
+    name: str
+    scene: Callable[[Mesh], Scene]
+    meshes: tuple[Mesh, ...]
+    reference: Callable[[float], Mesh]  # of a coarsening
+    cells: tuple[str, ...]
+    step: float  # s
+    until: float  # s
+    observer: Callable[[], Any]
+    series: Callable[[Any], NDArray]
+    begin: Callable[[Scene], Snapshot] | None = None
+
+    def with_(self, mesh: Mesh, model: Model, treatment: Treatment) -> Scene:
+        scene = self.scene(mesh)
+        return replace(scene, model=model, baths=[replace(bath, treatment=treatment) for bath in scene.baths])
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """One run: its series, the largest distance from the condition, its cost; `failed` is the time of the failure [s]."""
+
+    time: NDArray
+    series: NDArray
+    condition: float
+    result: Result | None
+    failed: float | None
+
+
+def at_rest(scene: Scene) -> Snapshot:
+    """The block at 7000 s. A homogeneous state, the same for every treatment, without effluxes."""
+    treatment = Essential() if isinstance(scene.model, Potential) else Penalty(relative=1e4)
+    twin = replace(scene, baths=[replace(bath, treatment=treatment) for bath in scene.baths])
+    rest = twin.equilibrate(free_swelling.INITIAL)
+    values = np.zeros(scene.problem.vector.size)
+    values[: rest.values.size] = rest.values
+    return Snapshot(rest.time, values)
+
+
+def execute(case: Case, scene: Scene, watch_condition: bool = True) -> Outcome:
+    """Run a scene to the case's end, or to where it fails."""
+    watched, condition = case.observer(), Condition()
+    observers = [watched, Patience(), *([condition] if watch_condition else [])]
+    begin = case.begin(scene) if case.begin else None
+    result, failed = None, None
+    try:
+        result = scene.run(case.until, Fixed(case.step), observers, resume=begin)
+    except StepError as error:
+        failed = error.time
+    return Outcome(watched.time, case.series(watched), max(condition.values[1:], default=0.0), result, failed)
+
+
+def top(probe: Probe) -> NDArray:
+    values = probe.values["displacement"]
+    return values if values.ndim == 1 else values[:, -1]
+
+
+def cases(quick: bool) -> list[Case]:
+    """The three scenes on three meshes each."""
+    columns, column_end = ((6, 8, 12), 25.0) if quick else ((15, 30, 60), 60.0)
+    blocks, block_step, block_end = ((3, 4, 6), 16.0, 7100.0) if quick else ((6, 11, 22), 8.0, 7224.0)
+
+    def strip(mesh: Mesh) -> Scene:
+        scene = oscillation.scene(Penalty(1.0))
+        return replace(scene, mesh=mesh, baths=[replace(bath, c=boundary_charge.BATH) for bath in scene.baths])
+
+    def graded_column(coarsening: float) -> Mesh:
+        return column(0.5, round(60 / coarsening), grade={"top": 10})
+
+    def graded_block(coarsening: float) -> Mesh:
+        n = round((6 if quick else 20) / coarsening)
+        return rectangle(free_swelling.WIDTH, free_swelling.HEIGHT, n, n, grade={"top": 6, "left": 6, "bottom": 6})
+
+    return [
+        Case(
+            "column", lambda mesh: replace(boundary_charge.scene(Penalty(1.0), 1), mesh=mesh),
+            tuple(column(0.5, n) for n in columns), graded_column, tuple(f"{n}" for n in columns), 2.5, column_end,
+            lambda: Probe((0.5,), "displacement"), top,
+        ),
+        Case(
+            "strip", strip,
+            tuple(rectangle(0.02, 0.5, 1, n) for n in columns), graded_column, tuple(f"1 x {n}" for n in columns), 2.5, column_end,
+            lambda: Probe((0.0, 0.5), "displacement"), top,
+        ),
+        Case(
+            "block", lambda mesh: replace(free_swelling.scene(1, 1), mesh=mesh),
+            tuple(rectangle(free_swelling.WIDTH, free_swelling.HEIGHT, n, n) for n in blocks), graded_block,
+            tuple(f"{n} x {n}" for n in blocks), block_step, block_end, Area, lambda area: area.values, at_rest,
+        ),
+    ]  # fmt: skip
+
+
+def reference(case: Case, coarsening: float = 1.0) -> Outcome:
+    """The potential model of order 3 on a graded mesh. The strip's is the column: nothing varies across it."""
+    model = Potential(order=3)
+    if case.name == "strip":
+        case = replace(case, scene=lambda mesh: replace(boundary_charge.scene(Penalty(1.0), 1), mesh=mesh),
+                       observer=lambda: Probe((0.5,), "displacement"))  # fmt: skip
+    return execute(case, case.with_(case.reference(coarsening), model, Essential()), watch_condition=False)
+
+
+def distance(outcome: Outcome, exact: Outcome, case: Case) -> float:
+    """Largest difference to the reference over its times, in units of the last displacement or the first area."""
+    size = exact.series[0] if case.name == "block" else exact.series[-1]
+    difference = np.interp(exact.time, outcome.time, outcome.series) - exact.series
+    return float(np.abs(difference).max() / abs(size))
+
+
+def growth(choice: Choice, value: float | None) -> float:
+    """|growth| of one step of the strip of Fig. 8 at rest."""
+    scene = oscillation.scene(Penalty(1.0))
+    baths = [replace(bath, treatment=choice.make(value)) for bath in scene.baths]
+    return abs(growth_factor(replace(scene, model=choice.model, baths=baths), oscillation.STEP).factor)
+
+
+@dataclass(frozen=True)
+class Row:
+    """One run in the table; `error` and `condition` are nan where it failed."""
+
+    case: str
+    mesh: str
+    treatment: str
+    value: float | None
+    error: float
+    condition: float
+    iterations: int
+    rejected: int
+    seconds: float
+    failed: float | None
+
+
+def row(case: Case, cells: str, name: str, value: float | None, outcome: Outcome, exact: Outcome) -> Row:
+    done = outcome.result
+    if done is None:
+        return Row(case.name, cells, name, value, np.nan, np.nan, 0, 0, np.nan, outcome.failed)
+    error, seconds = distance(outcome, exact, case), round(done.seconds, 4)
+    return Row(case.name, cells, name, value, error, outcome.condition, done.iterations, done.rejections, seconds, None)
+
+
+def run(quick: bool = False) -> Findings:
+    """All of them."""
+    numbers: dict[str, float | int | str] = {}
+    rows: list[Row] = []
+    results: list[Result] = []
+    scenes = cases(quick)
+    for case in scenes:
+        exact = reference(case)
+        numbers[f"{case.name}_reference_error"] = distance(reference(case, COARSENING), exact, case)
+        for cells, mesh in zip(case.cells, case.meshes, strict=True):
+            runs = [(name, choice, value) for name, choice in CHOICES.items() for value in choice.over(quick)]
+            for name, choice, value in tqdm(runs, desc=f"{case.name} {cells}", leave=False, disable=not sys.stderr.isatty()):
+                outcome = execute(case, case.with_(mesh, choice.model, choice.make(value)))
+                results += [outcome.result] if outcome.result else []
+                rows.append(row(case, cells, name, value, outcome, exact))
+            failures = sum(r.failed is not None for r in rows if (r.case, r.mesh) == (case.name, cells))
+            print(f"treatments {case.name} {cells}: {len(runs)} runs, {failures} fail", file=sys.stderr, flush=True)
+    growths = {(name, value): growth(choice, value) for name, choice in CHOICES.items() for value in choice.over(quick)}
+
+    for case in scenes:
+        for name in CHOICES:
+            numbers |= summary(case, name, [r for r in rows if (r.case, r.treatment) == (case.name, name)])
+    for name in CHOICES:
+        numbers[f"strip_{key(name)}_growth"] = max(size for (of, _), size in growths.items() if of == name)
+    numbers |= paper_in_natural_units()
+    numbers |= {"mesh": "; ".join(f"{case.name} {', '.join(case.cells)}" for case in scenes), **cost(results)}
+
+    header = (
+        "scene",
+        "mesh",
+        "treatment",
+        "value",
+        "error",
+        "condition",
+        "iterations",
+        "rejected",
+        "seconds",
+        "growth",
+        "outcome",
+    )
+    table = [
+        (
+            r.case, r.mesh, r.treatment, blank(r.value), blank(r.error), blank(r.condition), r.iterations, r.rejected,
+            blank(r.seconds), growths[r.treatment, r.value] if r.case == "strip" else "",
+            "passes" if r.failed is None else f"fails at {r.failed:.6g} s",
+        )
+        for r in rows
+    ]  # fmt: skip
+    return Findings(draw(scenes, rows), header, table, numbers)
+
+
+def blank(value: float | None) -> float | str:
+    return "" if value is None or np.isnan(value) else value
+
+
+def key(name: str) -> str:
+    return name.replace(" ", "_")
+
+
+def summary(case: Case, name: str, rows: list[Row]) -> dict[str, float | int]:
+    """What the rows of one treatment in one scene say."""
+    prefix = f"{case.name}_{key(name)}"
+    found: dict[str, float | int] = {f"{prefix}_failures": sum(r.failed is not None for r in rows)}
+    middle = [r for r in rows if r.mesh == case.cells[1] and r.failed is None]
+    if not middle:
+        return found
+    found[f"{prefix}_condition"] = min(r.condition for r in middle)
+    found[f"{prefix}_iterations"] = int(np.median([r.iterations for r in middle]))
+    least = min(r.error for r in middle)
+    if not CHOICES[name].swept:
+        return found | {f"{prefix}_error": least}
+    within = [r.value for r in middle if r.value is not None and r.error <= 1.1 * least]
+    return found | {f"{prefix}_plateau": least, f"{prefix}_from": min(within), f"{prefix}_to": max(within)}
+
+
+def paper_in_natural_units() -> dict[str, float]:
+    """ε = 1 and 40 on the paper's meshes: h = 1/60 mm and 0.05 mm."""
+    of = {"strip": (1.0, 0.5 / 30, TABLE_1), "block": (40.0, free_swelling.HEIGHT / 20, TABLE_2)}
+    numbers = {}
+    for name, (epsilon, h, material) in of.items():
+        numbers[f"{name}_paper_over_K_h"] = epsilon * h / material.number("K")
+        numbers[f"{name}_paper_over_D_h"] = epsilon * h / material.number("D_plus")
+    return numbers
+
+
+# Line and marker of each family, and marker of each treatment without parameter.
+STYLES = {
+    "penalty": ("k", "-", "o"), "nitsche": ("k", "--", "s"), "nitsche skew": ("0.5", "--", "^"),
+    "nitsche without adjoint": ("0.5", ":", "v"), "potential penalty": ("0.5", "-", "D"),
+}  # fmt: skip
+MARKS = {
+    "nitsche skew without penalty": "^", "multiplier": "s", "potential essential": "D", "potential logarithm": "d",
+    "lagged": "x", "lagged inner layer": "+", "lagged averaged": "1", "lagged least squares": "2", "frozen": "*",
+}  # fmt: skip
+
+
+def draw(scenes: Sequence[Case], rows: Sequence[Row]) -> Figure:
+    """Error over the penalty on the middle mesh, and error over seconds on all meshes at each one's best value."""
+    figure, grid = plt.subplots(2, 3, figsize=(9.6, 7.2))
+    for column_, case in enumerate(scenes):
+        mine = [r for r in rows if r.case == case.name]
+        over_value, over_seconds = grid[0, column_], grid[1, column_]
+        draw_sweeps(over_value, [r for r in mine if r.mesh == case.cells[1]])
+        over_value.set(title=f"{case.name}, {case.cells[1]} cells", xlabel="ε, γ  [K/h, D₊/h]")
+        draw_costs(over_seconds, case, mine)
+        over_seconds.set(xlabel="seconds of the time loop")
+    for axes in grid[:, 0]:
+        axes.set_ylabel("largest error of displacement or area")
+    handles: dict[str, Any] = {}
+    for axes in grid.flat:
+        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
+            handles.setdefault(label, handle)
+    figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=4, fontsize=7.5)
+    return figure
+
+
+def draw_sweeps(axes: Axes, rows: Sequence[Row]) -> None:
+    for name, (colour, line, marker) in STYLES.items():
+        good = [(r.value, r.error) for r in rows if r.treatment == name and r.failed is None]
+        if good:
+            axes.loglog(*zip(*good, strict=True), color=colour, ls=line, marker=marker, ms=3.5, lw=1, label=name)
+        bad = [r.value or 0.0 for r in rows if r.treatment == name and r.failed is not None]
+        axes.plot(bad, [0.97] * len(bad), marker=marker, ls="", ms=5, mfc="none", mec=colour,
+                  transform=axes.get_xaxis_transform(), clip_on=False)  # fmt: skip
+    for r in rows:
+        if r.treatment in MARKS and r.failed is None:
+            axes.plot(1e9, r.error, "k", marker=MARKS[r.treatment], ls="", ms=5, label=r.treatment)
+
+
+def draw_costs(axes: Axes, case: Case, rows: Sequence[Row]) -> None:
+    for name in CHOICES:
+        best = []
+        for cells in case.cells:
+            good = [r for r in rows if (r.treatment, r.mesh) == (name, cells) and r.failed is None]
+            if good:
+                least = min(good, key=lambda r: r.error)
+                best.append((least.seconds, least.error))
+        colour, line, marker = STYLES.get(name, ("k", ":", MARKS.get(name, "")))
+        if best:
+            axes.loglog(*zip(*best, strict=True), color=colour, ls=line, marker=marker, ms=4, lw=0.8)
