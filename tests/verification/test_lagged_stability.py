@@ -34,9 +34,11 @@ from ngswell.stability import growth_factor, leading_eigenvalues
 from studies.oscillation import disturbed, measured_growth
 
 SOFT = replace(TABLE_1, mu=0.06)
+"""Here the dead load p0 exceeds µ and the strip would buckle, faster than steps of 0.1 s and more can resolve: backward Euler
+damps that, and what grows is the column's mode of the lagged boundary."""
 SHARP = Newton(tolerance=1e-12)  # disturbances of 1e-6 have to be converged, too
 
-ROUND_OFF_TO_NONLINEAR = 5e-3
+ROUND_OFF_TO_NONLINEAR = 2e-3
 """Relative accuracy of an observed factor: some ten steps between round-off and the first effect of nonlinearity, over which
 the next mode still fades."""
 
@@ -101,7 +103,7 @@ def test_lagged_strip_grows_as_predicted(name, dt):
     assert observed(scene, dt, predicted) == pytest.approx(predicted, rel=ROUND_OFF_TO_NONLINEAR)
     # Control: the growth of a material a tenth stiffer is another one.
     stiffer = replace(scene.material, mu=1.1 * scene.material.mu)
-    assert growth_factor(loaded(Lagged(), stiffer), dt).factor != pytest.approx(predicted, rel=4 * ROUND_OFF_TO_NONLINEAR)
+    assert growth_factor(loaded(Lagged(), stiffer), dt).factor != pytest.approx(predicted, rel=0.02)
 
 
 @pytest.mark.parametrize("dt", [0.1, 10.0])
@@ -211,7 +213,8 @@ def test_swollen_block_grows_as_predicted():
     rest = swollen(scene)
     predicted = growth_factor(scene, 10.0, rest).factor
     assert predicted < -1.5
-    assert observed(scene, 10.0, predicted, (1.0, 1.0), rest) == pytest.approx(predicted, rel=2e-2)
+    # The second mode, that of the two sides against each other, lies 0.5 % below: it has not faded when the run ends.
+    assert observed(scene, 10.0, predicted, (1.0, 1.0), rest) == pytest.approx(predicted, rel=5e-3)
 
 
 def test_the_growing_mode_of_the_strip_is_lateral():
