@@ -34,8 +34,8 @@ from ngswell.stability import growth_factor, leading_eigenvalues
 from studies.oscillation import disturbed, measured_growth
 
 SOFT = replace(TABLE_1, mu=0.06)
-"""Here the dead load p0 exceeds µ and the strip would buckle, faster than steps of 0.1 s and more can resolve: backward Euler
-damps that, and what grows is the column's mode of the lagged boundary."""
+"""Here the dead load p0 exceeds µ and the strip would buckle, faster than steps of 0.1 s and more can resolve: backward
+Euler damps that, and what grows is the column's mode of the lagged boundary."""
 SHARP = Newton(tolerance=1e-12)  # disturbances of 1e-6 have to be converged, too
 
 ROUND_OFF_TO_NONLINEAR = 2e-3
