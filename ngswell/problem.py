@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -241,7 +241,7 @@ class Problem:
             for name, value in self.model.equilibrium(entry.fields, cfc, self.scene.material).items():
                 on_boundary = GridFunction(self._component(name).space)
                 on_boundary.Set(value, definedon=self.mesh.Boundaries(entry.bath.boundary))
-                dofs = self._boundary_dofs(name, entry.bath.boundary)
+                dofs = self._bath_dofs[name, entry.bath.boundary]
                 found.append((self.ranges[name].start + dofs, on_boundary.vec.FV().NumPy()[dofs]))
         return found
 
@@ -250,7 +250,7 @@ class Problem:
         rule = entry.treatment.rule if isinstance(entry.treatment, Lagged) else None
         if rule is None:
             return charge
-        boundary = self._bath_boundary(entry.bath.boundary)
+        boundary = self._bath_boundaries[entry.bath.boundary]
         wanted = self.model.equilibrium(entry.fields, charge, self.scene.material)
         slopes = Slopes(*(boundary.values(wanted[name].Diff(charge)) for name in ("p", "c")))
         sampled = GridFunction(charge.space)  # its first coefficients are the values at the vertices
@@ -258,14 +258,19 @@ class Problem:
         sampled.vec.FV().NumPy()[boundary.vertices] = rule.sample(at_vertices, boundary, slopes)
         return sampled
 
-    @cache  # noqa: B019  # a scene keeps its problem anyway
-    def _bath_boundary(self, boundary: str) -> BathBoundary:
-        baths = "|".join(entry.bath.boundary for entry in self._baths)
-        return BathBoundary(self.mesh, boundary, baths, self.kinematics.weight)
+    @cached_property
+    def _bath_boundaries(self) -> dict[str, BathBoundary]:
+        baths = "|".join(self.baths)
+        return {boundary: BathBoundary(self.mesh, boundary, baths, self.kinematics.weight) for boundary in self.baths}
 
-    @cache  # noqa: B019  # a scene keeps its problem anyway
-    def _boundary_dofs(self, name: str, boundary: str) -> NDArray:
-        return np.flatnonzero(list(self._component(name).space.GetDofs(self.mesh.Boundaries(boundary))))
+    @cached_property
+    def _bath_dofs(self) -> dict[tuple[str, str], NDArray]:
+        """Degrees of freedom of the unknowns that baths hold, on each of their boundaries."""
+        return {
+            (name, boundary): np.flatnonzero(list(self._component(name).space.GetDofs(self.mesh.Boundaries(boundary))))
+            for name in self.model.held.values()
+            for boundary in self.baths
+        }
 
     # -- the discrete system -------------------------------------------------------------------------------------------
 

@@ -35,6 +35,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.ticker import NullFormatter
 from ngsolve import Mesh
 from numpy.typing import NDArray
 from tqdm import tqdm
@@ -232,8 +234,8 @@ def cases(quick: bool) -> list[Case]:
         ),
         Case(
             "strip", strip,
-            tuple(rectangle(0.02, 0.5, 1, n) for n in columns), graded_column, tuple(f"1 x {n}" for n in columns), 2.5, column_end,
-            lambda: Probe((0.0, 0.5), "displacement"), top,
+            tuple(rectangle(0.02, 0.5, 1, n) for n in columns), graded_column, tuple(f"1 x {n}" for n in columns),
+            2.5, column_end, lambda: Probe((0.0, 0.5), "displacement"), top,
         ),
         Case(
             "block", lambda mesh: replace(free_swelling.scene(1, 1), mesh=mesh),
@@ -386,40 +388,58 @@ MARKS = {
 }  # fmt: skip
 
 
+BESIDE = 1e15
+"""Where on the axis of ε the treatments without parameter stand."""
+
+
 def draw(scenes: Sequence[Case], rows: Sequence[Row]) -> Figure:
     """Error over the penalty on the middle mesh, and error over seconds on all meshes at each one's best value."""
-    figure, grid = plt.subplots(2, 3, figsize=(9.6, 7.2))
+    figure, grid = plt.subplots(2, 3, figsize=(9.6, 7.6))
     for column_, case in enumerate(scenes):
         mine = [r for r in rows if r.case == case.name]
         over_value, over_seconds = grid[0, column_], grid[1, column_]
         draw_sweeps(over_value, [r for r in mine if r.mesh == case.cells[1]])
-        over_value.set(title=f"{case.name}, {case.cells[1]} cells", xlabel="ε, γ  [K/h, D₊/h]")
+        over_value.set(title=f"{case.name}, {case.cells[1]} cells", xlabel="ε or γ [K/h and D₊/h]")
         draw_costs(over_seconds, case, mine)
-        over_seconds.set(xlabel="seconds of the time loop")
-    for axes in grid[:, 0]:
-        axes.set_ylabel("largest error of displacement or area")
-    handles: dict[str, Any] = {}
+        over_seconds.set(xlabel="seconds of the time loop", title=f"{case.name}, three meshes")
     for axes in grid.flat:
-        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
-            handles.setdefault(label, handle)
-    figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=4, fontsize=7.5)
+        axes.xaxis.set_minor_formatter(NullFormatter())
+        axes.yaxis.set_minor_formatter(NullFormatter())
+    for axes in grid[:, 0]:
+        axes.set_ylabel("largest relative error")
+    handles = [
+        Line2D([], [], color=colour, ls=line, marker=marker, ms=4, lw=1, label=name)
+        for name, (colour, line, marker) in STYLES.items()
+    ]
+    handles += [Line2D([], [], color="k", ls="", marker=marker, ms=5, label=name) for name, marker in MARKS.items()]
+    figure.legend(handles=handles, loc="outside lower center", ncols=4, fontsize=7.5)
     return figure
 
 
 def draw_sweeps(axes: Axes, rows: Sequence[Row]) -> None:
+    """Families over their parameter; on the right those without; open marks at the top where a run fails."""
     for name, (colour, line, marker) in STYLES.items():
-        good = [(r.value, r.error) for r in rows if r.treatment == name and r.failed is None]
+        mine = [r for r in rows if r.treatment == name and r.value is not None]
+        good = [(r.value, r.error) for r in mine if r.failed is None]
         if good:
-            axes.loglog(*zip(*good, strict=True), color=colour, ls=line, marker=marker, ms=3.5, lw=1, label=name)
-        bad = [r.value or 0.0 for r in rows if r.treatment == name and r.failed is not None]
-        axes.plot(bad, [0.97] * len(bad), marker=marker, ls="", ms=5, mfc="none", mec=colour,
-                  transform=axes.get_xaxis_transform(), clip_on=False)  # fmt: skip
+            axes.loglog(*zip(*good, strict=True), color=colour, ls=line, marker=marker, ms=3.5, lw=1)
+        draw_failures(axes, [r.value for r in mine if r.value and r.failed is not None], colour, marker)
     for r in rows:
         if r.treatment in MARKS and r.failed is None:
-            axes.plot(1e9, r.error, "k", marker=MARKS[r.treatment], ls="", ms=5, label=r.treatment)
+            axes.loglog(BESIDE, r.error, "k", marker=MARKS[r.treatment], ls="", ms=5)
+        elif r.treatment in MARKS:
+            draw_failures(axes, [BESIDE], "k", MARKS[r.treatment])
+    axes.axvline(BESIDE / 30, color="0.7", lw=0.8)
+    axes.set_xlim(right=BESIDE * 30)
+
+
+def draw_failures(axes: Axes, values: Sequence[float], colour: str, marker: str) -> None:
+    axes.plot(values, [1.0] * len(values), marker=marker, ls="", ms=5, mfc="none", mec=colour,
+              transform=axes.get_xaxis_transform(), clip_on=False)  # fmt: skip
 
 
 def draw_costs(axes: Axes, case: Case, rows: Sequence[Row]) -> None:
+    """Each treatment at its best value, from mesh to mesh."""
     for name in CHOICES:
         best = []
         for cells in case.cells:
