@@ -17,7 +17,7 @@ def points(mesh: Mesh, region: object = VOL, order: int = 4) -> NDArray:
 def integral_on_boundary(
     mesh: Mesh, field: CoefficientFunction, boundary: str, order: int, measure: CoefficientFunction | float = 1.0
 ) -> float:
-    """Integral over a boundary of a field of the body (its derivatives included) times `measure`; in 1-d the sum of values."""
+    """Integral over a boundary of a field of the body (and its derivatives) times `measure`; in 1-d the sum of values."""
     region = mesh.Boundaries(boundary)
     if mesh.dim == 1:  # NGSolve's traces of derivatives need a boundary with area
         return sum(field(mesh(*mesh[element.vertices[0]].point)) for element in region.Elements())

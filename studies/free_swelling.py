@@ -36,6 +36,7 @@ from ngswell import (
     Area,
     Bath,
     Blend,
+    Concentration,
     Ledger,
     Penalty,
     Pin,
@@ -73,6 +74,7 @@ def scene(nx: int, ny: int) -> Scene:
         mesh=rectangle(WIDTH, HEIGHT, nx, ny),
         kinematics=PlaneStrain(),
         material=TABLE_2,
+        model=Concentration(),
         charge=Ramp((0, 0.0), (4000, 1.0)),
         supports=[Symmetry("right"), Pin((0.0, 0.0), "y")],
         baths=[

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from ngswell import (
     TABLE_1,
     Bath,
+    Concentration,
     Fixed,
     InputError,
     Lagged,
@@ -54,6 +55,7 @@ def scene(treatment: Treatment) -> Scene:
         mesh=rectangle(0.02, 0.5, 1, 30),
         kinematics=PlaneStrain(),
         material=TABLE_1,
+        model=Concentration(),
         supports=[Roller("bottom", "y"), Roller("left|right", "x")],
         baths=[Bath("top", c=BATH, treatment=treatment)],
         loads=[Traction("top", (0.0, -P0))],

@@ -38,6 +38,7 @@ from ngswell import (
     TABLE_1,
     Averaged,
     Bath,
+    Concentration,
     Fixed,
     Frozen,
     InnerLayer,
@@ -91,6 +92,7 @@ def strip(gel: Material, treatment: Treatment, across: int = 1) -> Scene:
         mesh=rectangle(0.02, 0.5, across, 30),
         kinematics=PlaneStrain(),
         material=gel,
+        model=Concentration(),
         supports=[Roller("bottom", "y"), Roller("left|right", "x")],
         baths=[Bath("top", c=BATH, treatment=treatment)],
         loads=[Traction("top", (0.0, -p0))],
@@ -103,6 +105,7 @@ def block(gel: Material, treatment: Treatment, cells: int = 4) -> Scene:
         mesh=rectangle(1.0, 1.0, cells, cells),
         kinematics=PlaneStrain(),
         material=gel,
+        model=Concentration(),
         supports=[Symmetry("left"), Symmetry("bottom")],
         baths=[Bath("top|right", c=BATH, treatment=treatment)],
     )
