@@ -10,6 +10,10 @@ shares no function with ngswell:
 
     bath     q̄ = ε (p − p_D), j̄ = ε (c − c_D) per current area J |F⁻ᵀ N|,
     c_D = sqrt(c̄² + cfc²/4) + cfc/2,   p_D = 2 Rθ [sqrt(c̄² + cfc²/4) − c̄]                                (23), (38)
+    virtual bath   c̃ = sqrt[c (c − cfc)],   P = p − 2 Rθ (c − cfc/2 − c̃),   q̄ = ε P, j̄ = ε (c̃ − c̄)
+
+The same fields are asked of both models. Where a bath is met exactly (prescribed, by Nitsche's method, by multipliers) the
+chosen fields meet it: then c̃ and P are chosen and p, c follow.
 
 Divergences are taken in the strong form, by differentiating the chosen fields, and every boundary gets the normal traction
 and normal fluxes as well. A source in the weak form, ∫ W · Grad q, would repeat the model's integration by parts, and no
@@ -40,6 +44,7 @@ from ngsolve import (
     Parameter,
     cos,
     grad,
+    log,
     sin,
     specialcf,
     sqrt,
@@ -56,17 +61,20 @@ from ngswell import (
     Concentration,
     Fixed,
     Material,
+    Multiplier,
+    Nitsche,
     Penalty,
     Pin,
     PlaneStrain,
+    Potential,
     Roller,
     Scene,
     Solid,
     box,
     rectangle,
 )
+from ngswell.baths import Treatment
 from ngswell.errors import InputError
-from ngswell.models.concentration import State
 from ngswell.models.terms import Term
 from ngswell.problem import Problem
 from ngswell.supports import Support
@@ -201,21 +209,31 @@ class Exact:
         content = self.J - self.m.nS0
         return content, content * self.chosen.c
 
-    def bath_efflux(self, bath: WeakBath) -> tuple[CoefficientFunction, CoefficientFunction]:
-        """What the weak condition lets out per reference area: fluid [mm/s], cations [mol/l mm/s]."""
-        root = sqrt(bath.c**2 + self.cfc**2 / 4)
+    @cached_property
+    def virtual_bath(self) -> tuple[CoefficientFunction, CoefficientFunction]:
+        """P [N/mm²] and c̃ [mol/l] of the bath in equilibrium with the point."""
+        p, c, cfc = self.chosen.p, self.chosen.c, self.cfc
+        salt = sqrt(c * (c - cfc))
+        return p - 2 * self.m.RT * (c - cfc / 2 - salt), salt
+
+    @cached_property
+    def fields(self) -> dict[str, CoefficientFunction]:
+        """All scalar fields, by the names that models and outputs have for them."""
+        P, salt = self.virtual_bath
+        return {"p": self.chosen.p, "c": self.chosen.c, "cfc": self.cfc, "P": P, "salt": salt}
+
+    def excess(self, c: float, by_potentials: bool) -> tuple[CoefficientFunction, CoefficientFunction]:
+        """By how much the fields exceed equilibrium with a bath of c̄ = `c` [mol/l]: p − p_D, c − c_D or P, c̃ − c̄."""
+        if by_potentials:
+            return self.fields["P"], self.fields["salt"] - c
+        root = sqrt(c**2 + self.cfc**2 / 4)
+        return self.chosen.p - 2 * self.m.RT * (root - c), self.chosen.c - root - self.cfc / 2
+
+    @cached_property
+    def area_stretch(self) -> CoefficientFunction:
+        """Current area per reference area, J |F⁻ᵀ N| [-]."""
         push = Inv(self.F).trans * self.coordinates.normal()
-        area = self.J * sqrt(InnerProduct(push, push))
-        p_D, c_D = 2 * self.m.RT * (root - bath.c), root + self.cfc / 2
-        return bath.epsilon * area * (self.chosen.p - p_D), bath.epsilon * area * (self.chosen.c - c_D)
-
-
-class WeakBath(NamedTuple):
-    """A bath of the scene: its boundary, salt concentration [mol/l] and ε [mm³/(N s) for p, mm/s for c]."""
-
-    boundary: str
-    c: float
-    epsilon: float
+        return self.J * sqrt(InnerProduct(push, push))
 
 
 @dataclass(frozen=True)
@@ -245,7 +263,7 @@ class Case:
     coordinates: Cartesian
     parameters: Parameters
     boundaries: str
-    bath: WeakBath | None = None
+    bath: Bath | None = None
     true_rate: bool = False
     """The sources hold the time derivative of the contents; else the difference quotient, so that time adds no error."""
     clock: Clock = field(default_factory=Clock)
@@ -260,9 +278,17 @@ class Case:
         pairs = zip(self.at(now).contents, self.at(before).contents, strict=True)
         return [(new - old) / (now - before) for new, old in pairs]
 
-    def sources(self, tests: Sequence[CoefficientFunction]) -> list[Term]:
+    @property
+    def sealed(self) -> str:
+        """Boundaries where the model has no flux of its own."""
+        names = self.boundaries.split("|")
+        if self.bath is not None and isinstance(self.bath.treatment, (Nitsche, Multiplier)):
+            names.remove(self.bath.boundary)
+        return "|".join(names)
+
+    def sources(self, tests: Sequence[CoefficientFunction], by_potentials: bool) -> list[Term]:
         """Terms that turn the residual's zero into the chosen fields."""
-        v, q, d, _ = tests
+        v, *of_contents = tests[:3]
         exact, at = self.at(self.clock.now), self.coordinates
         normal, dimension = at.normal(), at.dimension
         traction = exact.stress * normal
@@ -271,34 +297,57 @@ class Case:
             Term("momentum", "body force", InnerProduct(at.tensor_divergence(exact.stress), v)),
             Term("momentum", "traction", -InnerProduct(held, v), boundary=self.boundaries),
         ]
-        for balance, test, rate, flux in zip(("fluid", "cations"), (q, d), self.rates(), exact.fluxes, strict=True):
+        balances = list(zip(("fluid", "cations"), of_contents, strict=True))
+        for (balance, test), rate, flux in zip(balances, self.rates(), exact.fluxes, strict=True):
             terms.append(Term(balance, "source", -(rate + at.divergence(flux)) * test))
-            terms.append(Term(balance, "outflow", InnerProduct(flux, normal) * test, boundary=self.boundaries))
-        if self.bath is not None:
-            for balance, test, efflux in zip(("fluid", "cations"), (q, d), exact.bath_efflux(self.bath), strict=True):
-                terms.append(Term(balance, "outflow to the bath", -efflux * test, boundary=self.bath.boundary))
+            terms.append(Term(balance, "outflow", InnerProduct(flux, normal) * test, boundary=self.sealed))
+        if self.bath is not None and isinstance(self.bath.treatment, Penalty):
+            epsilon = self.bath.treatment.epsilon
+            assert epsilon is not None, "the sources need the raw ε"
+            for (balance, test), excess in zip(balances, exact.excess(SALT, by_potentials), strict=True):
+                outflow = -epsilon * exact.area_stretch * excess * test
+                terms.append(Term(balance, "outflow to the bath", outflow, boundary=self.bath.boundary))
         return terms
 
     def errors(self, problem: Problem) -> dict[str, float]:
-        """L2 norms over the body of what the fields of `problem` are off at the clock's time, and of their gradients."""
+        """L2 norms over the body of what the fields of `problem` are off at the clock's time, and of their gradients.
+
+        p, c and cfc are the outputs; of models with other unknowns, these too. Of multipliers, the norms over the boundary
+        of what the effluxes are off.
+        """
         exact, at = self.at(self.clock.now), self.coordinates
-        u, p, c, cfc = problem.fields.components
-        chosen = exact.chosen
+        unknowns, found = dict(zip(problem.names, problem.fields.components, strict=True)), problem.state.outputs()
+        u = unknowns.pop("u")
         differences = {
-            "u": u - CF(chosen.u),
-            "p": p - chosen.p,
-            "c": c - chosen.c,
-            "cfc": cfc - exact.cfc,
+            "u": u - CF(exact.chosen.u),
+            "p": found["p"] - exact.chosen.p,
+            "c": found["c_plus"] - exact.chosen.c,
+            "cfc": found["cfc"] - exact.cfc,
             "grad u": at.discrete_gradient(u) - exact.displacement_gradient,
-            "grad p": _padded(grad(p)) - at.gradient(chosen.p),
-            "grad c": _padded(grad(c)) - at.gradient(chosen.c),
         }
+        for name in problem.model.held.values():
+            wanted = exact.fields[name]
+            if name == "salt" and isinstance(problem.model, Potential) and problem.model.logarithm:
+                wanted = log(wanted)
+            differences[name] = unknowns[name] - wanted
+            differences[f"grad {name}"] = _padded(grad(unknowns[name])) - at.gradient(wanted)
         # Squares of errors of degree k and of smooth fields: three orders more than the square of the displacement.
         order = 2 * problem.model.order + 3
-        return {
+        result = {
             name: Integrate((InnerProduct(e, e) * at.measure).Compile(), problem.mesh, order=order) ** 0.5
             for name, e in differences.items()
         }
+        if self.bath is None or not isinstance(self.bath.treatment, Multiplier):
+            return result
+        boundary = self.bath.boundary
+        factors = self.bath.treatment.factors(problem.scene.material, problem.cell_size(boundary))
+        for balance, factor, flux in zip(problem.model.held, factors, exact.fluxes, strict=True):
+            name = f"efflux of {balance}"
+            # The exact stretch stands for the discrete one, whose error is not the multiplier's.
+            e = factor * unknowns[name] * exact.area_stretch - InnerProduct(flux, at.normal())
+            region = problem.mesh.Boundaries(boundary)
+            result[name] = Integrate(e * e * at.measure, problem.mesh, definedon=region, order=order) ** 0.5
+        return result
 
 
 def _padded(g: CoefficientFunction) -> CoefficientFunction:
@@ -307,14 +356,26 @@ def _padded(g: CoefficientFunction) -> CoefficientFunction:
 
 @dataclass(frozen=True)
 class Manufactured(Concentration):
-    """The model under test, driven by the sources of a case."""
+    """A model under test, driven by the sources of a case."""
 
     case: Case | None = None
 
-    def terms(self, state: State, tests: Sequence[CoefficientFunction]) -> list[Term]:
+    def terms(self, state: Any, tests: Sequence[CoefficientFunction]) -> list[Term]:
         if self.case is None:
             raise InputError("Manufactured needs a case")
-        return super().terms(state, tests) + self.case.sources(tests)
+        return super().terms(state, tests) + self.case.sources(tests, by_potentials=False)
+
+
+@dataclass(frozen=True)
+class ManufacturedPotential(Potential):
+    """The other one."""
+
+    case: Case | None = None
+
+    def terms(self, state: Any, tests: Sequence[CoefficientFunction]) -> list[Term]:
+        if self.case is None:
+            raise InputError("ManufacturedPotential needs a case")
+        return super().terms(state, tests) + self.case.sources(tests, by_potentials=True)
 
 
 # -- the cases ----------------------------------------------------------------------------------------------------------
@@ -378,6 +439,22 @@ def smooth(kind: str, duration: float) -> Callable[[Any], Chosen]:
     return chosen
 
 
+def in_equilibrium(kind: str, duration: float) -> Callable[[Any], Chosen]:
+    """Smooth fields that meet a bath of `SALT` at P̄ = 0 on the top, with fluxes through it: c̃ = c̄ and P = 0 there."""
+
+    def chosen(time: Any) -> Chosen:
+        m, a = Parameters(**NUMBERS, RT=RT), sin(time / duration) / np.sin(1.0)
+        u, *_ = smooth(kind, duration)(time)
+        depth, across = (1 - z, cos(y / 2)) if kind == "3-d" else (1 - y, CF(1.0))
+        salt = SALT + 0.2 * a * cos(1.5 * x) * across * sin(1.2 * depth)
+        P = 0.05 * a * cos(x) * across * sin(2 * depth)
+        cfc = Exact(Chosen(u, P, salt), KINDS[kind][2], m).cfc
+        mean = sqrt(salt * salt + cfc * cfc / 4)
+        return Chosen(u, P + 2 * RT * (mean - salt), mean + cfc / 2)
+
+    return chosen
+
+
 def affine(kind: str, duration: float) -> Callable[[Any], Chosen]:
     """Fields that every space holds, so that no error but that of the time remains."""
 
@@ -400,8 +477,13 @@ PINS: dict[str, list[Support]] = {
 }
 
 
-BATH = WeakBath("top", SALT, 0.01)
+BATH = Bath("top", c=SALT, treatment=Penalty(0.01))
 """Weak enough that neither p nor c is as good as prescribed: the condition itself is tested."""
+
+
+def exact_bath(treatment: Treatment) -> Bath:
+    """The bath that the fields `in_equilibrium` meet."""
+    return Bath("top", c=SALT, treatment=treatment)
 
 
 def errors(
@@ -411,20 +493,21 @@ def errors(
     duration: float,
     steps: int = 2,
     fields: Callable[[str, float], Callable[[Any], Chosen]] = smooth,
-    bath: WeakBath | None = None,
-    model: type[Manufactured] = Manufactured,
+    bath: Bath | None = None,
+    model: type[Manufactured] | type[ManufacturedPotential] = Manufactured,
     true_rate: bool = False,
+    **choices: Any,
 ) -> dict[str, float]:
-    """Error norms at the end of the motion."""
+    """Error norms at the end of the motion. `choices` are the model's."""
     make_mesh, motion, coordinates, supports, boundaries = KINDS[kind]
     case = Case(fields(kind, duration), coordinates, Parameters(**NUMBERS, RT=RT), boundaries, bath, true_rate)
     scene = Scene(
         mesh=make_mesh(cells),
         kinematics=motion,
         material=Material(**NUMBERS),
-        model=model(order=order, case=case),
-        supports=supports if fields is smooth else PINS[kind],
-        baths=[Bath(bath.boundary, c=bath.c, treatment=Penalty(bath.epsilon))] if bath else [],
+        model=model(order=order, case=case, **choices),
+        supports=PINS[kind] if fields is affine else supports,
+        baths=[bath] if bath else [],
         initial=(SALT, 0.0),
     )
     case.clock.follow(scene.problem)

@@ -160,7 +160,7 @@ def test_linearisation_is_the_derivative_of_the_residual(order):
 @pytest.mark.parametrize("name", DISCRETISATIONS)
 def test_linearisation_of_models_and_treatments(name, motion):
     coarse, fine = central_difference_errors(body(motion, *DISCRETISATIONS[name]).problem, (0.2, 0.1))
-    assert fine.max() < 1e-2
+    assert fine.max() < 3e-4  # measured at most 1e-4
     # Central differences are of second order, balance by balance; where the residual is nearly linear, round-off of 1e-11.
     assert (fine < np.maximum(coarse / 3.6, 1e-10)).all()
 
