@@ -17,6 +17,7 @@ from ngswell import (
     Material,
     Penalty,
     PlaneStrain,
+    Potential,
     Ramp,
     Roller,
     Scene,
@@ -43,7 +44,7 @@ def block(model=None, material=TABLE_2, supports=None, **changes):
     )
 
 
-@pytest.mark.parametrize("model", [None, LocalDonnan()])
+@pytest.mark.parametrize("model", [None, LocalDonnan(), Potential()])
 @pytest.mark.parametrize(("time", "bath"), [(500.0, 4.1), (600.0, 0.3)])
 def test_homogeneous_block(model, time, bath):
     scene = block(model)
@@ -58,10 +59,11 @@ LAYERED = Material(
 )
 
 
+@pytest.mark.parametrize("model", [None, Potential()])
 @pytest.mark.parametrize("supports", [None, [Roller("bottom", "xy"), Symmetry("left")]])
-def test_agrees_with_the_transient(supports):
+def test_agrees_with_the_transient(supports, model):
     """Fields of position, free and clamped: the transient ends in the same state, at many times the iterations."""
-    scene = block(material=LAYERED, supports=supports)
+    scene = block(model, material=LAYERED, supports=supports)
     direct = scene.equilibrate(600.0)
     end = scene.run(1e7, Adaptive(2e-2)).end
     for name, part in scene.problem.ranges.items():

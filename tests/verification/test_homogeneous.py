@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from ngswell import LocalDonnan, laws
+from ngswell import LocalDonnan, Potential, laws
 from ngswell.analytic import homogeneous_equilibrium
 from studies.verification import gel, homogeneous_body, printed_drive, unrest
 
 
 @pytest.mark.parametrize("motion", ["confined", "plane strain", "3-d"])
-@pytest.mark.parametrize("model", [None, LocalDonnan()])
+@pytest.mark.parametrize("model", [None, LocalDonnan(), Potential(), Potential(logarithm=True)])
 def test_over_baths_and_charges(motion, model):
     """Baths over nearly seven decades, charges from none to 1 mol/l: up to thirtyfold swelling, to Newton's tolerance."""
     largest = 0.0

@@ -17,8 +17,11 @@ from ngswell import (
     Frozen,
     InputError,
     Ledger,
+    Multiplier,
     Newton,
+    Nitsche,
     Penalty,
+    Potential,
     Probe,
     Ramp,
     Roller,
@@ -161,6 +164,33 @@ def test_decay_rates_to_round_off():
     assert found / closed_rates(4) - 1 == pytest.approx(shift, abs=1e-10)
 
 
+EXACT_BATHS = {
+    "Potential": {"model": Potential(order=5), "treatment": None},
+    "Potential, logarithm": {"model": Potential(order=5, logarithm=True), "treatment": None},
+    "Multiplier": {"model": Concentration(order=5), "treatment": Multiplier()},
+    "Nitsche": {"model": Concentration(order=5), "treatment": Nitsche()},
+}
+
+
+@pytest.mark.parametrize("name", EXACT_BATHS)
+def test_decay_rates_with_baths_that_are_met_exactly(name):
+    found = discrete_rates(4, cells=20, **EXACT_BATHS[name])
+    # No penalty shifts the rates (−1.5e-7 above). Quartic fields leave (αh)⁸ of a small share, 1e-11 at n = 1.
+    assert found / closed_rates(4) - 1 == pytest.approx(np.zeros(4), abs=1e-10)
+
+
+@pytest.mark.parametrize(("order", "cells", "share"), [(2, 10, 1 / 12), (3, 5, 1 / 720)])
+def test_slowest_decay_rates_of_the_virtual_bath(order, cells, share):
+    """The dispersion of linear (quadratic) P and c̃ is that of p and c: at a uniform state one set is linear in the other."""
+    coarse, fine = (
+        discrete_rates(4, cells=n, model=Potential(order=order), treatment=None) / closed_rates(4) - 1
+        for n in (cells, 2 * cells)
+    )
+    wave = np.pi / (2 * HEIGHT) * np.array([1, 1, 3, 3])
+    assert fine == pytest.approx(share * (wave * HEIGHT / (2 * cells)) ** (2 * order - 2), rel=0.05)
+    assert np.log2(coarse / fine) == pytest.approx(np.full(4, 2.0 * order - 2), abs=0.1)
+
+
 def test_penalty_slows_the_decay_as_predicted():
     def rates(relative):
         return discrete_rates(2, cells=10, model=Concentration(order=3), treatment=Penalty(relative=relative))
@@ -216,12 +246,12 @@ def test_each_mode_decays_alone(k, n):
 # -- the step of the bath ----------------------------------------------------------------------------------------------
 
 
-def column_run(change, until, dt, cells=20, order=3, relative=1e6, treatment=None):
+def column_run(change, until, dt, cells=20, order=3, relative=1e6, treatment=None, model=None):
     """Fields at PLACES (last time) and the top's displacement (all times) after the bath's step c̄ → c̄ (1 + change)."""
+    treatment = treatment or (Penalty(relative=relative) if model is None else None)
     scene = confined_column(
-        treatment or Penalty(relative=relative), c=BATH * (1 + change), cells=cells, initial=(BATH, 0.0),
-        model=Concentration(order=order),
-    )  # fmt: skip
+        treatment, c=BATH * (1 + change), cells=cells, initial=(BATH, 0.0), model=model or Concentration(order=order)
+    )
     top, probes = Probe((HEIGHT,), "displacement"), [Probe((place,), *FIELDS) for place in PLACES]
     scene.run(until, Fixed(dt), [top, *probes], EXACT)
     fields = {name: np.array([np.diff(probe.values[name].ravel()[[0, -1]])[0] for probe in probes]) for name in FIELDS}
@@ -264,6 +294,15 @@ def test_step_of_the_bath_to_the_bias_of_the_penalty():
     found = response(**run, order=4, cells=20)
     # The penalty slows all by 1.5e-7 (test above); order 4 leaves as much in the layer of the first step.
     assert deviations(found, closed_response(**run, step=5.0)).max() < 3e-7
+
+
+@pytest.mark.parametrize("model", [Potential(5), Potential(5, logarithm=True), Concentration(5)])
+def test_step_of_the_bath_without_bias(model):
+    treatment = Multiplier() if isinstance(model, Concentration) else None
+    run = {"until": 50.0, "dt": 5.0}
+    found = response(**run, cells=20, model=model, treatment=treatment)
+    # Quartic fields: the mesh leaves some 1e-9 in the layer of the first step; round-off of 1e-16/1e-6 as much.
+    assert deviations(found, closed_response(**run, step=5.0)).max() < 1e-8
 
 
 def test_step_of_the_bath_converges_in_time():
