@@ -9,22 +9,30 @@ from conftest import confined_column, strip
 from ngsolve import x, y
 
 from ngswell import (
+    TABLE_2,
     VTK,
     Adaptive,
     Area,
     Bath,
     Concentration,
+    Essential,
     Fixed,
     Frozen,
     Integral,
     Lagged,
     Ledger,
+    Multiplier,
+    Nitsche,
     Penalty,
+    PlaneStrain,
     Potential,
     Probe,
     Progress,
     Ramp,
+    Scene,
     Snapshots,
+    Symmetry,
+    rectangle,
 )
 
 FALLING = Ramp((0, 0.15), (10, 0.125))
@@ -65,6 +73,97 @@ def test_ledger_closes(treatment, order):
     assert max(ledger.imbalance().values()) < 1e-11
     assert ledger.fluid_left["top"][-1] < -1e-4  # the column swells: fluid comes in
     assert np.abs(np.diff(ledger.cations)).max() > 1e-5
+
+
+@pytest.mark.parametrize("motion", [confined_column, strip])
+@pytest.mark.parametrize(
+    ("model", "treatment"),
+    [
+        (Potential(), Essential()),
+        (Potential(3), Essential()),
+        (Potential(), Penalty(relative=1e3)),
+        (Potential(logarithm=True), Essential()),
+        (Concentration(), Nitsche()),
+        (Concentration(), Nitsche(0.0, "skew")),
+        (Concentration(3), Nitsche(adjoint="none")),
+        (Concentration(3), Multiplier()),
+    ],
+)
+def test_ledger_closes_for_every_model_and_treatment(model, treatment, motion):
+    ledger = Ledger()
+    cells = 10 if motion is confined_column else (1, 10)
+    motion(treatment, c=FALLING, model=model, cells=cells).run(60.0, Fixed(5.0), [ledger])
+    assert max(ledger.imbalance().values()) < 1e-11  # Newton's last quadratic remainder
+    size = 0.5 if motion is confined_column else 0.5 * 0.02
+    assert ledger.fluid_left["top"][-1] < -1e-4 * size
+    assert np.abs(np.diff(ledger.cations)).max() > 1e-5 * size
+
+
+PAIRS = [
+    (Concentration(), Multiplier(), Multiplier()),
+    (Concentration(), Multiplier(), Penalty(relative=1e3)),
+    (Concentration(), Multiplier(), Nitsche()),
+    (Concentration(), Nitsche(), Penalty(relative=1e3)),
+    (Potential(), Essential(), Essential()),
+    (Potential(), Essential(), Penalty(relative=1e3)),
+]
+
+
+@pytest.mark.parametrize(("model", "first", "second"), PAIRS)
+def test_ledger_with_two_baths_that_share_a_corner(model, first, second):
+    ledger = Ledger()
+    scene = Scene(
+        mesh=rectangle(1.0, 1.0, 3, 3),
+        kinematics=PlaneStrain(),
+        material=TABLE_2,
+        model=model,
+        supports=[Symmetry("left"), Symmetry("bottom")],
+        baths=[Bath("top", c=Ramp((0, 1.0), (100, 0.9)), treatment=first), Bath("right", c=1.0, treatment=second)],
+        charge=Ramp((0, 0.0), (100, 0.5)),
+    )
+    scene.run(100.0, Fixed(25.0), [ledger])
+    assert max(ledger.imbalance().values()) < 1e-10  # relative to what is held; Newton's remainder
+    assert min(abs(ledger.fluid_left[side][-1]) for side in ("top", "right")) > 1e-4
+    assert abs(ledger.cations_left["top"][-1] - ledger.cations_left["right"][-1]) > 1e-5  # the baths differ
+
+
+def test_models_name_their_outputs_alike():
+    one, other = (confined_column(model=model).problem.state.outputs() for model in (Concentration(), Potential()))
+    assert list(one) == list(other)
+
+
+@pytest.mark.parametrize(
+    ("model", "treatment"),
+    [(Potential(), None), (Potential(logarithm=True), None), (Concentration(), Multiplier()), (Concentration(), Nitsche())],
+)
+def test_a_run_goes_on_from_its_end(model, treatment):
+    def scene():
+        return confined_column(treatment, c=FALLING, model=model, cells=6)
+
+    half = scene().run(20.0, Fixed(5.0))
+    resumed = scene().run(40.0, Fixed(5.0), resume=half.end).end
+    through = scene().run(40.0, Fixed(5.0)).end
+    assert resumed.time == through.time
+    # The first step after resuming starts without an extrapolation: Newton's remainder, 1e-8 of sizes of 1 and below.
+    assert resumed.values == pytest.approx(through.values, abs=1e-9)
+
+
+def test_vtk_of_the_virtual_bath_reads_back(tmp_path):
+    scene = strip(None, c=FALLING, model=Potential(), cells=(1, 10))
+    top = Probe((0.0, 0.5), "p", "c_plus", "c_minus", "J", when=[0.0, 30.0])
+    scene.run(30.0, Fixed(10.0), [VTK(tmp_path / "series", when=[0.0, 30.0]), top])
+    entries = ElementTree.parse(tmp_path / "series.pvd").getroot().findall(".//DataSet")
+    data = meshio.read(tmp_path / entries[-1].get("file"))
+    fields = data.point_data
+    assert set(fields) >= set(scene.problem.state.outputs())
+    at_top = np.argmin(np.linalg.norm(data.points - [0.0, 0.5, 0.0], axis=1))
+    for name in ("p", "c_plus", "c_minus", "J"):
+        assert fields[name][at_top] == pytest.approx(top.values[name][-1], rel=1e-12)
+    # c₊ − c₋ is the charge at the point, J included; on the top c₊ c₋ = c̄², and P = P̄, exactly.
+    assert fields["c_plus"] - fields["c_minus"] == pytest.approx(fields["cfc"], rel=1e-12)
+    assert fields["cfc"] == pytest.approx(0.75 * 0.2 / (fields["J"] - 0.25), rel=1e-12)
+    assert fields["c_plus"][at_top] * fields["c_minus"][at_top] == pytest.approx(0.125**2, rel=1e-12)
+    assert fields["hydraulic_pressure"][at_top] == pytest.approx(-2 * scene.material.RT * 0.125, rel=1e-12)
 
 
 def test_ledger_keeps_two_baths_apart():

@@ -175,8 +175,9 @@ EXACT_BATHS = {
 @pytest.mark.parametrize("name", EXACT_BATHS)
 def test_decay_rates_with_baths_that_are_met_exactly(name):
     found = discrete_rates(4, cells=20, **EXACT_BATHS[name])
-    # No penalty shifts the rates (−1.5e-7 above). Quartic fields leave (αh)⁸ of a small share, 1e-11 at n = 1.
-    assert found / closed_rates(4) - 1 == pytest.approx(np.zeros(4), abs=1e-10)
+    # No penalty shifts the rates (−1.5e-7 above). Quartic fields leave (αh)⁸ of a small share; measured 1e-12, as
+    # much as round-off.
+    assert found / closed_rates(4) - 1 == pytest.approx(np.zeros(4), abs=1e-11)
 
 
 @pytest.mark.parametrize(("order", "cells", "share"), [(2, 10, 1 / 12), (3, 5, 1 / 720)])
@@ -301,8 +302,8 @@ def test_step_of_the_bath_without_bias(model):
     treatment = Multiplier() if isinstance(model, Concentration) else None
     run = {"until": 50.0, "dt": 5.0}
     found = response(**run, cells=20, model=model, treatment=treatment)
-    # Quartic fields: the mesh leaves some 1e-9 in the layer of the first step; round-off of 1e-16/1e-6 as much.
-    assert deviations(found, closed_response(**run, step=5.0)).max() < 1e-8
+    # Quartic fields: the mesh leaves 1e-9 or less in the layer of the first step; round-off of 1e-16/1e-6 as much.
+    assert deviations(found, closed_response(**run, step=5.0)).max() < 2e-9
 
 
 def test_step_of_the_bath_converges_in_time():

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from ngsolve import CF, x
+from ngsolve import CF, x, y
 
 from ngswell import (
     TABLE_1,
@@ -22,6 +22,7 @@ from ngswell import (
     Newton,
     Penalty,
     PlaneStrain,
+    Potential,
     Probe,
     Ramp,
     Roller,
@@ -44,8 +45,8 @@ TIMES = np.array([1.0, 2, 4, 8, 16, 32, 64, 128, 256, 512, 1024])  # s
 
 
 def uncharged_scene(motion, model):
-    """A loaded body without charge; the full model carries the salt of a constant bath along."""
-    c = None if isinstance(model, Uncharged) else 0.15
+    """A loaded body without charge; the full models have salt that diffuses out on its own."""
+    c = None if isinstance(model, Uncharged) else Ramp((0, 0.15), (20, 0.1))
     bath = Bath("top", c=c, P=Ramp((0, 0.0), (20, 0.03)), treatment=WEAK)
     if motion == "column":
         mesh, kinematics, supports = column(0.5, 20), Confined(), [Roller("bottom", "x")]
@@ -58,21 +59,23 @@ def uncharged_scene(motion, model):
     )
 
 
+@pytest.mark.parametrize("full", [Concentration, Potential])
 @pytest.mark.parametrize("order", [2, 3])
 @pytest.mark.parametrize("motion", ["column", "block"])
-def test_uncharged_is_the_full_model_without_charge(motion, order):
+def test_uncharged_is_the_full_model_without_charge(motion, order, full):
     # Without charge p and u do not see the salt, in every discrete equation: what differs is Newton's remainder.
     vectors = []
-    for model in (Uncharged(order=order), Concentration(order=order)):
+    for model in (Uncharged(order=order), full(order=order)):
         scene = uncharged_scene(motion, model)
         result = scene.run(100.0, Fixed(5.0))
         assert len(result.steps) == 20  # the same steps
-        vectors.append({name: scene.problem.vector[scene.problem.ranges[name]] for name in ("u", "p")})
-    lean, full = vectors
-    assert np.abs(lean["u"]).max() > 0.02  # mm: finite strain
+        pressure = model.held["fluid"]  # p, or P, which is p without charge
+        vectors.append([scene.problem.vector[scene.problem.ranges[name]] for name in ("u", pressure)])
+    (u, p), (u_full, p_full) = vectors
+    assert np.abs(u).max() > 0.02  # mm: finite strain
     # Corrections below 1e-8 of the natural sizes are left out, and one more is applied than was tested.
-    assert lean["u"] == pytest.approx(full["u"], abs=1e-10)
-    assert lean["p"] == pytest.approx(full["p"], abs=1e-10)
+    assert u == pytest.approx(u_full, abs=1e-10)
+    assert p == pytest.approx(p_full, abs=1e-10)
 
 
 def disturbed_column(model, material, load=0.0, c=0.15, P=0.0, cells=20):
@@ -102,7 +105,7 @@ DISTURBANCES = {
 }
 
 
-def distances(disturbance):
+def distances(disturbance, full_model=Concentration):
     """Largest difference of LocalDonnan to the full model, relative to the largest displacement, for faster and faster ions.
 
     Only K/D and the clock matter. K is a tenth of Table 1's, so that the largest D stays below what a Material admits;
@@ -112,15 +115,16 @@ def distances(disturbance):
     for factor in (1, 10, 100):
         D_plus, D_minus = factor * TABLE_1.D_plus, factor * TABLE_1.D_minus
         material = replace(TABLE_1, K=0.1 * TABLE_1.K, D_plus=D_plus, D_minus=D_minus)
-        lean, full = (top(disturbed_column(m(order=3), material, **disturbance)) for m in (LocalDonnan, Concentration))
+        lean, full = (top(disturbed_column(m(order=3), material, **disturbance)) for m in (LocalDonnan, full_model))
         result.append(np.abs(lean - full).max() / np.abs(full).max())
     return np.array(result)
 
 
+@pytest.mark.parametrize("full", [Concentration, Potential])
 @pytest.mark.parametrize("name", DISTURBANCES)
-def test_local_donnan_is_the_limit_of_fast_ions(name):
+def test_local_donnan_is_the_limit_of_fast_ions(name, full):
     # First order in 1/D once salt diffuses faster (here within 40 to 4 s for D × 10 and × 100) than anything else happens.
-    error = distances(DISTURBANCES[name])
+    error = distances(DISTURBANCES[name], full)
     order = np.log10(error[:-1] / error[1:])
     assert error[0] < 0.1
     assert order[1] == pytest.approx(1.0, abs=0.06)
@@ -151,6 +155,29 @@ def test_small_strains_need_effective_parameters_only(load):
     assert bare[-1] / charged[-1] > 1.6
 
 
+@pytest.mark.parametrize("choice", [{}, {"phi": 0.9, "phi_bath": 0.95, "Gamma": 1.1}])
+def test_a_uniform_virtual_bath_is_local_donnan(choice):
+    """Where c̃ is uniform the two models have one formula for everything: round-off only."""
+    material = replace(TABLE_2, **choice)
+    states = []
+    for model in (LocalDonnan(), Potential()):
+        scene = Scene(
+            mesh=rectangle(1.0, 1.0, 2, 2), kinematics=PlaneStrain(), material=material, model=model,
+            supports=[Symmetry("left"), Symmetry("bottom")], baths=[Bath("top", c=0.3)], charge=Ramp((0, 0.7)),
+        )  # fmt: skip
+        scene.problem.initialise()
+        u, P = scene.problem.fields.components[:2]
+        u.Set((0.2 * x + 0.1 * x * y, 0.3 * y - 0.1 * x * x))
+        P.Set(0.1 * x - 0.3 * y)
+        states.append((scene, scene.problem.state.outputs()))
+    (lean, wanted), (full, found) = states
+    for place in ((0.2, 0.3), (0.9, 0.6)):
+        for name, field in wanted.items():
+            expected = np.array(field(lean.mesh(*place)))
+            assert np.array(found[name](full.mesh(*place))) == pytest.approx(expected, rel=1e-12, abs=1e-15), name
+    assert set(found) - set(wanted) == {"cation_flux"}
+
+
 def equilibrium(model, bath, kinematics):
     """J, p, c₊, cfc, nS, hydraulic pressure at rest after the bath has moved to `bath`."""
     c = Ramp((0, 4.1), (100, bath))
@@ -172,10 +199,12 @@ def equilibrium(model, bath, kinematics):
 
 
 @pytest.mark.parametrize("motion", ["confined", "plane strain"])
-def test_both_models_come_to_the_same_equilibrium(motion):
-    lean, full = (equilibrium(model, 0.3, motion) for model in (LocalDonnan(), Concentration()))
+def test_all_models_come_to_the_same_equilibrium(motion):
+    models = (LocalDonnan(), Concentration(), Potential())
+    lean, full, other = (equilibrium(model, 0.3, motion) for model in models)
     # A homogeneous state lies in every space: what is left is the relaxation still to come.
     assert lean == pytest.approx(full, rel=1e-7)
+    assert lean == pytest.approx(other, rel=1e-7)
     closed = homogeneous_equilibrium(TABLE_2, 0.3, motion, hydraulic=0.01)
     for name, value in (("J", closed.J), ("p", closed.p), ("c_plus", closed.c), ("cfc", closed.cfc), ("nS", closed.nS)):
         assert lean[name] == pytest.approx(value, rel=1e-7)
