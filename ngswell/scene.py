@@ -13,7 +13,7 @@ import numpy as np
 from ngsolve import CoefficientFunction, FESpace, Mesh, TaskManager, specialcf
 from threadpoolctl import threadpool_limits
 
-from ngswell.baths import Bath, Treatment
+from ngswell.baths import Bath, Multiplier, Treatment, Weak
 from ngswell.equilibrium import equilibrate
 from ngswell.errors import InputError
 from ngswell.kinematics import Kinematics
@@ -112,6 +112,18 @@ class Scene:
                 choices = ", ".join(t.__name__ for t in self.model.treatments)
                 model = type(self.model).__name__
                 raise InputError(f"bath on {bath.boundary!r}: {model} has no {bath.treatment!r}; it has {choices}")
+        self._check_multipliers()
+
+    def _check_multipliers(self) -> None:
+        """Refuse a bath that prescribes values in vertices where multipliers impose theirs: the system would be singular."""
+        prescribed = [bath for bath in self.baths if not isinstance(self.treatment(bath), Weak)]
+        for bath in self.baths:
+            for other in prescribed if isinstance(self.treatment(bath), Multiplier) else []:
+                if self._vertices_of(bath.boundary) & self._vertices_of(other.boundary):
+                    raise InputError(
+                        f"baths on {bath.boundary!r} and {other.boundary!r} touch: {self.treatment(bath)!r} would impose there "
+                        f"what {self.treatment(other)!r} prescribes; beside Multiplier take Penalty, Nitsche or Multiplier"
+                    )
 
     def _check_supports(self) -> None:
         bath_boundaries = {name for bath in self.baths for name in bath.boundary.split("|")}
@@ -155,13 +167,7 @@ class Scene:
         places -= places.mean(axis=0)
         places /= np.abs(places).max()
         for axis, direction in enumerate(directions):
-            fixed = {
-                vertex.nr
-                for name in held[direction].split("|")
-                if name
-                for element in self.mesh.Boundaries(name).Elements()
-                for vertex in element.vertices
-            }
+            fixed = {number for name in held[direction].split("|") if name for number in self._vertices_of(name)}
             fixed |= {self._vertex(s) for s in self.supports if isinstance(s, Pin) and direction in s.direction}
             rows += [self.kinematics.rigid_motions(places[number])[axis] for number in fixed]
         shapes = self.kinematics.rigid_motions(places[0])
@@ -173,6 +179,9 @@ class Scene:
             uniform = (shapes[:, motion] == self.kinematics.rigid_motions(places[-1])[:, motion]).all()
             free = f"translate in {directions[int(np.argmax(np.abs(shapes[:, motion])))]}" if uniform else "rotate"
             raise InputError(f"the body can {free}: add a Roller, Symmetry or Pin")
+
+    def _vertices_of(self, boundary: str) -> set[int]:
+        return {vertex.nr for element in self.mesh.Boundaries(boundary).Elements() for vertex in element.vertices}
 
     def _vertex(self, pin: Pin) -> int:
         places = vertices(self.mesh)

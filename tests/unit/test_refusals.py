@@ -2,6 +2,7 @@
 
 import math
 
+import numpy as np
 import pytest
 from conftest import confined_column, strip
 from ngsolve import CF, x
@@ -24,10 +25,13 @@ from ngswell import (
     LocalDonnan,
     Material,
     NgswellError,
+    Multiplier,
+    Nitsche,
     OutputError,
     Penalty,
     Pin,
     PlaneStrain,
+    Potential,
     Probe,
     Ramp,
     Roller,
@@ -92,6 +96,44 @@ def test_material_field_out_of_range_is_found_on_the_mesh():
         ({"baths": [Bath("top", P=0.1)]}, "Concentration needs its salt concentration"),
         ({"baths": [Bath("top", c=0.15, treatment=Essential())]}, "it has Penalty, Nitsche, Multiplier, Lagged, Frozen"),
         ({"initial": (None, 0.0)}, "needs a salt concentration"),
+        (
+            {"baths": [Bath("top", c=0.15, treatment=Multiplier()), Bath("left", c=0.15, treatment=Lagged())]},
+            r"'top' and 'left' touch: Multiplier\(\).*Lagged\(\).*take Penalty, Nitsche or Multiplier",
+        ),
+        (
+            {"baths": [Bath("left", c=0.15, treatment=Frozen()), Bath("top", c=0.15, treatment=Multiplier())]},
+            r"'top' and 'left' touch: Multiplier\(\).*Frozen\(\)",
+        ),
+        (
+            {"model": Potential(), "baths": [Bath("top", c=0.15, treatment=Nitsche())]},
+            r"'top': Potential has no Nitsche\(.*it has Essential, Penalty",
+        ),
+        (
+            {"model": Potential(), "baths": [Bath("top", c=0.15, treatment=Multiplier())]},
+            r"Potential has no Multiplier\(\); it has Essential, Penalty",
+        ),
+        (
+            {"model": Potential(), "baths": [Bath("top", c=0.15, treatment=Lagged())]},
+            r"Potential has no Lagged\(\); it has Essential, Penalty",
+        ),
+        (
+            {
+                "model": Potential(),
+                "baths": [Bath("top", c=0.1, treatment=Essential()), Bath("top", c=0.1, treatment=Penalty(1.0))],
+            },
+            "'top' already has a bath",
+        ),
+        ({"model": Potential(), "baths": [Bath("top", P=0.1)]}, "'top': Potential needs its salt concentration"),
+        ({"model": Potential(), "initial": (None, 0.0)}, "initial: Potential needs a salt concentration"),
+        (
+            {
+                "model": Uncharged(),
+                "material": UNCHARGED,
+                "baths": [Bath("top", treatment=Nitsche())],
+                "initial": (None, 0.0),
+            },
+            r"Uncharged has no Nitsche\(.*it has Essential, Penalty",
+        ),
         ({"model": Uncharged()}, "cfc0"),
         ({"model": Uncharged(), "material": UNCHARGED}, "takes no concentration"),
         ({"model": LocalDonnan(), "baths": []}, "needs a bath"),
@@ -102,6 +144,34 @@ def test_material_field_out_of_range_is_found_on_the_mesh():
 def test_scene(change, words):
     with pytest.raises(InputError, match=words):
         strip(**change)
+
+
+@pytest.mark.parametrize("other", [Lagged(), Frozen(), Penalty(1.0), Nitsche(), Multiplier()])
+def test_multipliers_stand_beside_baths_that_they_do_not_touch(other):
+    baths = [Bath("top", c=0.15, treatment=Multiplier()), Bath("bottom", c=0.15, treatment=other)]
+    assert strip(baths=baths, cells=(1, 3)).run(2.0, Fixed(1.0)).rejections == 0
+
+
+@pytest.mark.parametrize("other", [Penalty(1.0), Nitsche(), Multiplier()])
+def test_multipliers_stand_beside_weak_baths_that_they_touch(other):
+    baths = [Bath("top", c=0.15, treatment=Multiplier()), Bath("left", c=0.15, treatment=other)]
+    scene = strip(baths=baths, cells=(2, 3))
+    assert scene.run(2.0, Fixed(1.0)).rejections == 0
+
+
+def test_multipliers_beside_prescribed_values_would_be_singular(monkeypatch):
+    # Control: what is refused cannot be solved.
+    monkeypatch.setattr(Scene, "_check_multipliers", lambda scene: None)
+    baths = [Bath("top", c=0.15, treatment=Multiplier()), Bath("left", c=0.15, treatment=Lagged())]
+    problem = strip(baths=baths, cells=(2, 3)).problem
+    problem.initialise()
+    rows, columns, values = problem.linearise().COO()
+    matrix = np.zeros((problem.vector.size,) * 2)
+    matrix[np.array(rows), np.array(columns)] = values
+    free = np.flatnonzero(list(problem.free))
+    sizes = np.linalg.svd(matrix[np.ix_(free, free)], compute_uv=False)
+    # One multiplier of each balance too many, for the corner they share.
+    assert sizes[-2] < 1e-15 * sizes[0] < 1e-3 * sizes[-3]
 
 
 def test_symmetry_needs_a_straight_boundary():
@@ -124,6 +194,16 @@ def test_symmetry_needs_a_straight_boundary():
         (lambda: Penalty(-1.0), "positive"),
         (lambda: Penalty(relative=0.0), "positive"),
         (lambda: Penalty(math.nan), "positive"),
+        (lambda: Penalty(0.0), "positive and finite, got 0.0"),
+        (lambda: Penalty(relative=-1e3), "positive and finite, got -1000.0"),
+        (lambda: Nitsche(0.0), "adjoint 'symmetric': gamma has to be positive and finite, got 0.0"),
+        (lambda: Nitsche(0.0, "none"), "adjoint 'none': gamma has to be positive"),
+        (lambda: Nitsche(-1.0, "skew"), "adjoint 'skew': gamma has to be at least 0 and finite, got -1.0"),
+        (lambda: Nitsche(math.inf), "finite, got inf"),
+        (lambda: Nitsche(math.nan), "finite, got nan"),
+        (lambda: Nitsche(adjoint="antisymmetric"), "'antisymmetric' is none of 'symmetric', 'skew', 'none'"),
+        (lambda: Bath("top", c=0.15, treatment=Nitsche), r"none of Penalty\(...\), Nitsche\(\), Multiplier\(\)"),
+        (lambda: Potential(order=1), r"Potential\(order=1\): order 2 to 6"),
         (lambda: Ramp(), "at least one"),
         (lambda: Ramp((0, 1), (0, 2)), "increase"),
         (lambda: Ramp((5, 1), (4, 2)), "4 s follows 5 s"),
