@@ -121,8 +121,8 @@ class Scene:
             for other in prescribed if isinstance(self.treatment(bath), Multiplier) else []:
                 if self._vertices_of(bath.boundary) & self._vertices_of(other.boundary):
                     raise InputError(
-                        f"baths on {bath.boundary!r} and {other.boundary!r} touch: {self.treatment(bath)!r} would impose there "
-                        f"what {self.treatment(other)!r} prescribes; beside Multiplier take Penalty, Nitsche or Multiplier"
+                        f"baths on {bath.boundary!r} and {other.boundary!r} touch: {self.treatment(bath)!r} would impose "
+                        f"there what {self.treatment(other)!r} prescribes; beside it take Penalty, Nitsche or Multiplier"
                     )
 
     def _check_supports(self) -> None:
