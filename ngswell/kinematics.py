@@ -11,7 +11,7 @@ from ngsolve import CF, H1, CoefficientFunction, Cof, FESpace, Grad, Id, IfPos, 
 from numpy.typing import NDArray
 
 from ngswell.errors import InputError
-from ngswell.quadrature import vertices
+from ngswell.quadrature import vertices, vertices_of
 
 
 class Kinematics(Protocol):
@@ -166,9 +166,8 @@ class Axisymmetric:
         inner, size = radii.min(), radii.max()
         if inner < -1e-12 * abs(size):
             raise InputError(f"Axisymmetric: the mesh crosses the axis, its first coordinate r falls to {inner:g} mm")
-        names = [name for name in held["r"].split("|") if name]
         on_axis = set(np.flatnonzero(radii <= 1e-12 * size))
-        fixed = {v.nr for name in names for element in mesh.Boundaries(name).Elements() for v in element.vertices}
+        fixed = vertices_of(mesh, held["r"]) if held["r"] else set()
         if on_axis - fixed:
             raise InputError("Axisymmetric: the mesh touches the axis r = 0; hold it there, Roller(boundary, 'r')")
 

@@ -24,6 +24,11 @@ def integral_on_boundary(
     return Integrate(BoundaryFromVolumeCF(field) * measure, mesh, BND, definedon=region, order=order)
 
 
+def vertices_of(mesh: Mesh, boundary: str) -> set[int]:
+    """Numbers of the vertices on a boundary ("a|b")."""
+    return {vertex.nr for element in mesh.Boundaries(boundary).Elements() for vertex in element.vertices}
+
+
 def vertices(mesh: Mesh) -> NDArray:
     """Coordinates of the vertices [mm], one row each, in the order of their numbers."""
     return np.array([vertex.point for vertex in mesh.vertices])

@@ -18,6 +18,7 @@ from ngsolve import BND, H1, VOL, CoefficientFunction, GridFunction, LinearForm,
 from numpy.typing import NDArray
 
 from ngswell.errors import InputError
+from ngswell.quadrature import vertices_of
 
 
 class Slopes(NamedTuple):
@@ -40,7 +41,7 @@ class BathBoundary:
     @cached_property
     def vertices(self) -> NDArray:
         """Numbers of its vertices in the mesh, ascending; the order of every other array."""
-        return np.array(sorted(_on(self.mesh, self.boundary)))
+        return np.array(sorted(vertices_of(self.mesh, self.boundary)))
 
     @cached_property
     def places(self) -> NDArray:
@@ -72,7 +73,7 @@ class BathBoundary:
 
         A cell in a corner may have none; then those of the cells around that cell's vertices, and so on.
         """
-        on_baths = _on(self.mesh, self.baths)
+        on_baths = vertices_of(self.mesh, self.baths)
         if len(on_baths) == self.mesh.nv:
             raise InputError(f"InnerLayer on {self.boundary!r}: every vertex of the mesh lies at a bath; refine the mesh")
         around: list[set[int]] = [set() for _ in range(self.mesh.nv)]
@@ -91,10 +92,6 @@ class BathBoundary:
     @cached_property
     def _hats(self) -> H1:
         return H1(self.mesh, order=1)
-
-
-def _on(mesh: Mesh, boundaries: str) -> set[int]:
-    return {vertex.nr for element in mesh.Boundaries(boundaries).Elements() for vertex in element.vertices}
 
 
 def _nearest_off(number: int, around: list[set[int]], excluded: set[int]) -> set[int]:

@@ -19,11 +19,11 @@ from ngswell.errors import InputError
 from ngswell.kinematics import Kinematics
 from ngswell.materials import Material
 from ngswell.meshes import check_mesh
-from ngswell.models import Concentration, Model
+from ngswell.models import Model, Potential
 from ngswell.newton import Newton
 from ngswell.observers.base import Observer
 from ngswell.problem import Problem, Snapshot
-from ngswell.quadrature import points, vertices
+from ngswell.quadrature import points, vertices, vertices_of
 from ngswell.schedules import Ramp
 from ngswell.stepping import Adaptive, BackwardEuler, Control, StepReport
 from ngswell.supports import Load, Pin, Roller, Support, Symmetry, Traction, Weight
@@ -60,7 +60,7 @@ class Scene:
     mesh: Mesh
     kinematics: Kinematics
     material: Material
-    model: Model = Concentration()
+    model: Model = Potential()
     supports: Sequence[Support] = ()
     baths: Sequence[Bath] = ()
     loads: Sequence[Load] = ()
@@ -119,7 +119,7 @@ class Scene:
         prescribed = [bath for bath in self.baths if not isinstance(self.treatment(bath), Weak)]
         for bath in self.baths:
             for other in prescribed if isinstance(self.treatment(bath), Multiplier) else []:
-                if self._vertices_of(bath.boundary) & self._vertices_of(other.boundary):
+                if vertices_of(self.mesh, bath.boundary) & vertices_of(self.mesh, other.boundary):
                     raise InputError(
                         f"baths on {bath.boundary!r} and {other.boundary!r} touch: {self.treatment(bath)!r} would impose "
                         f"there what {self.treatment(other)!r} prescribes; beside it take Penalty, Nitsche or Multiplier"
@@ -167,7 +167,7 @@ class Scene:
         places -= places.mean(axis=0)
         places /= np.abs(places).max()
         for axis, direction in enumerate(directions):
-            fixed = {number for name in held[direction].split("|") if name for number in self._vertices_of(name)}
+            fixed = {number for name in held[direction].split("|") if name for number in vertices_of(self.mesh, name)}
             fixed |= {self._vertex(s) for s in self.supports if isinstance(s, Pin) and direction in s.direction}
             rows += [self.kinematics.rigid_motions(places[number])[axis] for number in fixed]
         shapes = self.kinematics.rigid_motions(places[0])
@@ -179,9 +179,6 @@ class Scene:
             uniform = (shapes[:, motion] == self.kinematics.rigid_motions(places[-1])[:, motion]).all()
             free = f"translate in {directions[int(np.argmax(np.abs(shapes[:, motion])))]}" if uniform else "rotate"
             raise InputError(f"the body can {free}: add a Roller, Symmetry or Pin")
-
-    def _vertices_of(self, boundary: str) -> set[int]:
-        return {vertex.nr for element in self.mesh.Boundaries(boundary).Elements() for vertex in element.vertices}
 
     def _vertex(self, pin: Pin) -> int:
         places = vertices(self.mesh)

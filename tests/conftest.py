@@ -2,7 +2,20 @@
 
 from __future__ import annotations
 
-from ngswell import TABLE_1, Bath, Confined, Penalty, PlaneStrain, Roller, Scene, Traction, column, donnan, rectangle
+from ngswell import (
+    TABLE_1,
+    Bath,
+    Concentration,
+    Confined,
+    Penalty,
+    PlaneStrain,
+    Roller,
+    Scene,
+    Traction,
+    column,
+    donnan,
+    rectangle,
+)
 
 WEAK = Penalty(1.0)
 P0 = donnan.pressure(0.15, 0.2, TABLE_1.RT)
@@ -16,6 +29,7 @@ def strip(treatment=WEAK, c=0.15, cells=(1, 30), **changes) -> Scene:
             "mesh": rectangle(0.02, 0.5, *cells),
             "kinematics": PlaneStrain(),
             "material": TABLE_1,
+            "model": Concentration(),
             "supports": [Roller("bottom", "y"), Roller("left|right", "x")],
             "baths": [Bath("top", c=c, treatment=treatment)],
             "loads": [Traction("top", (0.0, -P0))],
@@ -31,6 +45,7 @@ def confined_column(treatment=WEAK, c=0.15, cells=30, **changes) -> Scene:
             "mesh": column(0.5, cells),
             "kinematics": Confined(),
             "material": TABLE_1,
+            "model": Concentration(),
             "supports": [Roller("bottom", "x")],
             "baths": [Bath("top", c=c, treatment=treatment)],
             "loads": [Traction("top", (-P0,))],

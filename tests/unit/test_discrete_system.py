@@ -49,6 +49,7 @@ def block(**changes) -> Scene:
             "mesh": rectangle(1.0, 1.0, 2, 2),
             "kinematics": PlaneStrain(),
             "material": layered,
+            "model": Concentration(),
             "supports": [Roller("bottom", "y"), Roller("left", "x")],
             "baths": [Bath("top", c=0.5, P=0.01, treatment=Penalty(3.0)), Bath("right", c=0.5, P=0.01)],
             "loads": [Traction("top", (0.01, -0.02)), Weight((0.0, -1e-2), (0.0, -2e-2))],

@@ -24,8 +24,8 @@ from ngswell import (
     Ledger,
     LocalDonnan,
     Material,
-    NgswellError,
     Multiplier,
+    NgswellError,
     Nitsche,
     OutputError,
     Penalty,
@@ -98,7 +98,7 @@ def test_material_field_out_of_range_is_found_on_the_mesh():
         ({"initial": (None, 0.0)}, "needs a salt concentration"),
         (
             {"baths": [Bath("top", c=0.15, treatment=Multiplier()), Bath("left", c=0.15, treatment=Lagged())]},
-            r"'top' and 'left' touch: Multiplier\(\).*Lagged\(\).*take Penalty, Nitsche or Multiplier",
+            r"'top' and 'left' touch: Multiplier\(\).*Lagged.*take Penalty, Nitsche or Multiplier",
         ),
         (
             {"baths": [Bath("left", c=0.15, treatment=Frozen()), Bath("top", c=0.15, treatment=Multiplier())]},
@@ -114,7 +114,7 @@ def test_material_field_out_of_range_is_found_on_the_mesh():
         ),
         (
             {"model": Potential(), "baths": [Bath("top", c=0.15, treatment=Lagged())]},
-            r"Potential has no Lagged\(\); it has Essential, Penalty",
+            r"Potential has no Lagged.*; it has Essential, Penalty",
         ),
         (
             {

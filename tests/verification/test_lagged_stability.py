@@ -11,6 +11,7 @@ from ngswell import (
     TABLE_1,
     Averaged,
     Bath,
+    Concentration,
     Fixed,
     Frozen,
     InnerLayer,
@@ -56,6 +57,7 @@ def block(treatment, material=TABLE_1, cells=4):
         mesh=rectangle(1.0, 1.0, cells, cells),
         kinematics=PlaneStrain(),
         material=material,
+        model=Concentration(),
         supports=[Symmetry("left"), Symmetry("bottom")],
         baths=[Bath("top|right", c=0.15, treatment=treatment)],
     )

@@ -430,6 +430,7 @@ def steady_fluxes(material, bath, salt=0.0, hydraulic=0.0):
         mesh=column(THICKNESS, GEL_CELLS),
         kinematics=Confined(),
         material=material,
+        model=Concentration(),
         supports=[Roller("bottom", "x")],
         baths=[
             Bath("top", c=bath + salt / 2, P=hydraulic / 2, treatment=weak),

@@ -134,6 +134,7 @@ def undrained_stiffness(cells):
         mesh=rectangle(1.0, 1.0, cells, cells),
         kinematics=PlaneStrain(),
         material=TABLE_2,
+        model=Concentration(),
         supports=[Roller("left|right", "x"), Roller("bottom", "y")],
         baths=[Bath("top", c=0.3)],
     )
