@@ -49,7 +49,7 @@ class Penalty:
             return f"weak, ε = {self.epsilon:g}"
         return f"weak, ε = {self.relative:g} K/h and D₊/h"
 
-    def factors(self, material: Material, h: float) -> tuple[Field, Field]:
+    def factors(self, material: Material, h: Field) -> tuple[Field, Field]:
         """ε for p [mm³/(N s)] and for c [mm/s] on a boundary whose cells have the size h [mm]."""
         if self.relative is None:
             return self.epsilon, self.epsilon
@@ -82,8 +82,8 @@ class Nitsche:
     def __str__(self) -> str:
         return f"Nitsche, {self.adjoint} adjoint, γ = {self.gamma:g}"
 
-    def factors(self, material: Material, h: float) -> tuple[Field, Field]:
-        """γ K/h [mm³/(N s)] and γ D₊/h [mm/s]."""
+    def factors(self, material: Material, h: Field) -> tuple[Field, Field]:
+        """γ K/h [mm³/(N s)] and γ D₊/h [mm/s] for cells of the size h [mm] normal to the boundary."""
         return self.gamma * material.K / h, self.gamma * material.D_plus / h
 
 
@@ -99,7 +99,7 @@ class Multiplier:
     def __str__(self) -> str:
         return "Lagrange multipliers"
 
-    def factors(self, material: Material, h: float) -> tuple[Field, Field]:
+    def factors(self, material: Material, h: Field) -> tuple[Field, Field]:
         """K/h [mm³/(N s)] and D₊/h [mm/s]."""
         return material.K / h, material.D_plus / h
 

@@ -9,10 +9,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from ngsolve import CoefficientFunction, InnerProduct, Norm
+from ngsolve import CoefficientFunction, InnerProduct, Norm, specialcf
 
 from ngswell import laws
 from ngswell.baths import BathFields, Multiplier, Nitsche, Penalty
+from ngswell.kinematics import Kinematics
 from ngswell.models.terms import Model, Term
 
 CONDITION = "equilibrium with the bath"
@@ -29,13 +30,14 @@ def weak_terms(
     h: float,
     multipliers: Sequence[tuple[CoefficientFunction, CoefficientFunction]],
 ) -> list[Term]:
-    """Terms of one bath whose boundary cells have the size `h` [mm].
+    """Terms of one bath whose boundary cells have the mean size `h` [mm]; Nitsche's method takes that of each cell.
 
     `multipliers` are trial and test functions, one pair a balance; only `Multiplier` uses them.
     """
     excess = model.excess(state, bath)
     tested = {balance: tests[model.unknowns.index(model.held[balance])] for balance in excess}
-    factors = dict(zip(("fluid", "cations"), treatment.factors(state.material, h), strict=True))
+    size = normal_size(state.kinematics) if isinstance(treatment, Nitsche) else h
+    factors = dict(zip(("fluid", "cations"), treatment.factors(state.material, size), strict=True))
     if isinstance(treatment, Nitsche):
         return _nitsche(treatment, state, excess, tested, factors, boundary)
     stretch = state.kinematics.area_stretch(state.u)
@@ -50,6 +52,15 @@ def weak_terms(
         terms.append(Term(balance, "efflux", efflux, boundary=boundary))
         terms.append(Term(CONDITION, balance, factors[balance] * value * test * stretch, boundary=boundary))
     return terms
+
+
+def normal_size(kinematics: Kinematics) -> CoefficientFunction:
+    """Size normal to the boundary of the cell at a point, |Aᵀ N| for the map x = A ξ from the reference cell [mm].
+
+    For integrals with normal derivatives. With the mean size, the penalty would be too weak for cells far below it.
+    """
+    dimension = kinematics.dimension
+    return Norm(specialcf.JacobianMatrix(dimension).trans * specialcf.normal(dimension))
 
 
 def _nitsche(

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from conftest import confined_column, strip
-from ngsolve import IfPos, x, y
+from ngsolve import L2, IfPos, LinearForm, ds, x, y
 
 from ngswell import (
     TABLE_1,
@@ -37,6 +37,7 @@ from ngswell import (
     rectangle,
 )
 from ngswell.solvers import LinearSolver, best_solver
+from ngswell.weak import normal_size
 
 
 def block(**changes) -> Scene:
@@ -245,6 +246,25 @@ def test_relative_penalty_is_a_multiple_of_K_over_h(treatment, h):
         problem.form(efflux).Apply(problem.fields.vec, vector)
         results.append(vector.FV().NumPy().sum())
     assert results[0] == pytest.approx(results[1], rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("mesh", "motion", "size"),
+    [
+        (column(1.0, 4), Confined(), 1 / 4),
+        (rectangle(1.0, 1.0, 4, 5), PlaneStrain(), 1 / 5),
+        (rectangle(1.0, 1.0, 4, 5, triangles=True), PlaneStrain(), 1 / 5),
+        (box(1.0, 1.0, 1.0, 2, 2, 3), Solid(), 1 / 3),
+        (box(1.0, 1.0, 1.0, 2, 2, 3, cells="prisms"), Solid(), 1 / 3),
+        (box(1.0, 1.0, 1.0, 2, 2, 3, cells="tetrahedra"), Solid(), 1 / 3),
+    ],
+    ids=["column", "quadrilaterals", "triangles", "hexahedra", "prisms", "tetrahedra"],
+)
+def test_normal_size_of_boundary_cells(mesh, motion, size):
+    space = L2(mesh, order=0)
+    form = LinearForm(space)
+    form += normal_size(motion) * space.TestFunction() * ds(definedon=mesh.Boundaries("top"), skeleton=True)
+    assert sum(form.Assemble().vec) == pytest.approx(size, rel=1e-12)  # on an area of 1 mm²
 
 
 @pytest.mark.parametrize("name", sorted({"umfpack", best_solver()}))

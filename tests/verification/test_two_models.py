@@ -6,9 +6,11 @@ that what separates them is the error of the mesh alone.
 
 import numpy as np
 import pytest
-from ngsolve import x, y
+from ngsolve import CF, x, y
+from ngsolve.meshes import MakeStructured2DMesh
 
 from ngswell import (
+    TABLE_2,
     Area,
     Axisymmetric,
     Bath,
@@ -27,9 +29,11 @@ from ngswell import (
     Roller,
     Scene,
     Solid,
+    StepError,
     Symmetry,
     box,
     rectangle,
+    weak,
 )
 
 SYMMETRIC = [Symmetry("left"), Symmetry("bottom")]
@@ -112,6 +116,47 @@ def test_nitsche_converges_to_the_same():
     between, _ = differences("plane strain", 2, (4, 8), Nitsche())
     assert np.log2(between[0] / between[1]).min() > 1.8  # 2.7, 2.5, 2.5
     assert between[1].max() < 1e-3
+
+
+def uneven(n, ratio):
+    """Square whose top row of cells gets flatter from left to right, by `ratio`."""
+    last = 1 - 1 / n
+
+    def mapping(s, t):
+        row = 0.4 * ratio**-s
+        return (s, t / last * (1 - row)) if t < last + 1e-12 else (s, 1 - n * (1 - t) * row)
+
+    return MakeStructured2DMesh(quads=True, nx=n, ny=n, mapping=mapping)
+
+
+def uneven_areas(treatment):
+    areas = []
+    for ratio in (1.0, 1e3):
+        scene = Scene(
+            mesh=uneven(4, ratio),
+            kinematics=PlaneStrain(),
+            material=TABLE_2,
+            supports=SYMMETRIC,
+            baths=[Bath("top", c=Ramp((0, 1.0), (100, 0.5)), treatment=treatment)],
+            charge=Ramp((0, 0.0), (100, 1.0)),
+        )
+        area = Area()
+        scene.run(500.0, Fixed(25.0), [area])
+        areas.append(area.values[-1])
+    return np.array(areas)
+
+
+def test_nitsche_takes_the_size_of_each_cell(monkeypatch):
+    """A thousandfold between the cells at one bath is as good as none: within 1 % of multipliers on either coarse mesh."""
+    exact = uneven_areas(Multiplier())
+    assert uneven_areas(Nitsche(5.0)) == pytest.approx(exact, rel=1e-2)  # 5e-3, 8e-4
+    # Control: with the mean size the flat cells lack penalty, and the result is wrong or there is none.
+    monkeypatch.setattr(weak, "normal_size", lambda kinematics: CF(0.075))
+    try:
+        wrong = uneven_areas(Nitsche(5.0))[1]
+    except StepError:
+        wrong = np.inf
+    assert abs(wrong / exact[1] - 1) > 1e-2
 
 
 def test_the_default_penalty_leaves_a_bias_of_first_order():
