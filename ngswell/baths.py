@@ -24,6 +24,10 @@ class BathFields(NamedTuple):
     P: CoefficientFunction
 
 
+def _is_number(value: object) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool)
+
+
 @dataclass(frozen=True)
 class Penalty:
     """Equilibrium imposed weakly, the third terms of (27) and (32), with the sign that makes them coercive:
@@ -41,7 +45,7 @@ class Penalty:
         if (self.epsilon is None) == (self.relative is None):
             raise InputError("Penalty takes either epsilon, Penalty(40.0), or relative, Penalty(relative=1e3)")
         value = self.epsilon if self.epsilon is not None else self.relative
-        if not (value is not None and 0 < value < float("inf")):
+        if not (_is_number(value) and 0 < value < float("inf")):  # type: ignore[operator]
             raise InputError(f"Penalty has to be positive and finite, got {value!r}")
 
     def __str__(self) -> str:
@@ -74,7 +78,8 @@ class Nitsche:
         if self.adjoint not in ("symmetric", "skew", "none"):
             raise InputError(f"Nitsche: adjoint {self.adjoint!r} is none of 'symmetric', 'skew', 'none'")
         least = "at least 0" if self.adjoint == "skew" else "positive"
-        if not (0 <= self.gamma < float("inf")) or (self.gamma == 0 and self.adjoint != "skew"):
+        inside = _is_number(self.gamma) and 0 <= self.gamma < float("inf")
+        if not inside or (self.gamma == 0 and self.adjoint != "skew"):
             raise InputError(
                 f"Nitsche with adjoint {self.adjoint!r}: gamma has to be {least} and finite, got {self.gamma!r}"
             )

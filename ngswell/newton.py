@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from ngsolve import BaseMatrix, BaseVector
 
 from ngswell.problem import Problem
 from ngswell.solvers import LinearSolver
@@ -29,6 +30,9 @@ class Newton:
     correction (old matrix, new residual) is smaller than the correction: the natural monotonicity test, which
     does not depend on units or on how equations are scaled. The simplified correction that passes the
     test of convergence is applied as well, so accepted states are about a factor `tolerance` better than tested.
+
+    Prescribed values are part of the correction. Put into the fields at once, a sudden change of a bath would be a jump
+    across one cell; every step would then start from it, however short.
     """
 
     tolerance: float = 1e-8
@@ -38,7 +42,14 @@ class Newton:
     def solve(self, problem: Problem, solver: LinearSolver) -> Outcome:
         """Iterate from the fields of `problem`, in place."""
         vector = problem.vector
-        residual, correction, simplified = (problem.fields.vec.CreateVector() for _ in range(3))
+        residual, correction, simplified, right, gap = (problem.fields.vec.CreateVector() for _ in range(5))
+
+        def solve(matrix: BaseMatrix, solution: BaseVector) -> bool:
+            gap.FV().NumPy()[:] = problem.gap()
+            right.data = residual - matrix * gap
+            solved = solver.solve(right, solution)
+            solution.data += gap
+            return solved
 
         def size(change) -> float:  # type: ignore[no-untyped-def]
             values = change.FV().NumPy()
@@ -54,7 +65,8 @@ class Newton:
             return Outcome(0, f"the step starts with {found[0]} not positive", found[0], found[1])
         problem.residual(residual)
         for count in range(1, self.most_iterations + 1):
-            if not solver.factorise(problem.linearise()) or not solver.solve(residual, correction):
+            matrix = problem.linearise()
+            if not solver.factorise(matrix) or not solve(matrix, correction):
                 return failure(count, "the linear system is singular or not finite")
             before = size(correction)
             if before <= self.tolerance:
@@ -67,7 +79,7 @@ class Newton:
                 refused = problem.inadmissible()
                 if refused is None:
                     problem.residual(residual)
-                    if solver.solve(residual, simplified) and size(simplified) <= (1 - damping / 4) * before:
+                    if solve(matrix, simplified) and size(simplified) <= (1 - damping / 4) * before:
                         break
                 damping /= 2
                 if damping < self.least_damping:

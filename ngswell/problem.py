@@ -128,6 +128,7 @@ class Problem:
         if "cfc" in self.names:
             self._charges |= {of: GridFunction(self._component("cfc").space) for of in ("start", "last")}
         self._old_contents = self.fields.vec.CreateVector()
+        self._prescribed: list[tuple[NDArray, NDArray]] = []
 
     # -- forms ---------------------------------------------------------------------------------------------------------
 
@@ -219,21 +220,32 @@ class Problem:
         return self.fields.vec.FV().NumPy()
 
     def begin_step(self, time: float, dt: float, guess: NDArray | None = None, charge_share: float = 1.0) -> None:
-        """Prepare the step that ends at `time`: history, parameters, prescribed values; `guess` as first iterate."""
+        """Prepare the step that ends at `time`: history, parameters, prescribed values; `guess` as first iterate.
+
+        The prescribed values are not put into the fields: see `gap`.
+        """
         self._contents.Apply(self.fields.vec, self._old_contents)
         self.dt.Set(dt)
         if "cfc" in self.names:
             self._charges["last"].vec.data = self._component("cfc").vec
         self.set_time(time, charge_share)
-        values = self._prescribed_values()
+        self._prescribed = self._prescribed_values()
         if guess is not None:
             self.vector[:] = guess
-        for dofs, numbers in values:
-            self.vector[dofs] = numbers
+
+    def gap(self) -> NDArray:
+        """What the fields exceed the prescribed values by, where there are any; zero elsewhere."""
+        gap = np.zeros(self.vector.size)
+        for dofs, values in self._prescribed:
+            gap[dofs] = self.vector[dofs] - values
+        return gap
 
     def _prescribed_values(self) -> list[tuple[NDArray, NDArray]]:
-        """Degrees of freedom and values of p and c on the boundaries of strongly treated baths."""
-        found = []
+        """Degrees of freedom and values of p and c on the boundaries of strongly treated baths.
+
+        Where two baths meet, the one that stands first in the scene prescribes: what comes last in `gap` counts.
+        """
+        found: list[tuple[NDArray, NDArray]] = []
         for entry in self._baths:
             if isinstance(entry.treatment, Weak):
                 continue
@@ -243,7 +255,7 @@ class Problem:
                 on_boundary.Set(value, definedon=self.mesh.Boundaries(entry.bath.boundary))
                 dofs = self._bath_dofs[name, entry.bath.boundary]
                 found.append((self.ranges[name].start + dofs, on_boundary.vec.FV().NumPy()[dofs]))
-        return found
+        return found[::-1]
 
     def _sampled(self, charge: Any, entry: _BathInForms) -> Any:
         """The charge that a bath's prescribed values follow: `charge` itself, or what a `Lagged` rule makes of it."""

@@ -92,6 +92,7 @@ def _linearised_step(problem: Problem, time: float, dt: float) -> Callable[[NDAr
     def perturbed(direction: NDArray) -> tuple[NDArray, NDArray]:
         problem.vector[:] = old + direction
         problem.begin_step(time + dt, dt, guess=new)
+        problem.vector[:] -= problem.gap()
         problem.residual(residual)
         return residual.FV().NumPy().copy(), problem.vector.copy()
 

@@ -44,7 +44,6 @@ from ngsolve import (
     Parameter,
     cos,
     grad,
-    log,
     sin,
     specialcf,
     sqrt,
@@ -327,8 +326,6 @@ class Case:
         }
         for name in problem.model.held.values():
             wanted = exact.fields[name]
-            if name == "salt" and isinstance(problem.model, Potential) and problem.model.logarithm:
-                wanted = log(wanted)
             differences[name] = unknowns[name] - wanted
             differences[f"grad {name}"] = _padded(grad(unknowns[name])) - at.gradient(wanted)
         # Squares of errors of degree k and of smooth fields: three orders more than the square of the displacement.

@@ -108,7 +108,6 @@ CHOICES: dict[str, Choice] = {
     "nitsche skew without penalty": fixed(Concentration(), Nitsche(0.0, "skew")),
     "multiplier": fixed(Concentration(), Multiplier()),
     "potential essential": fixed(Potential(), Essential()),
-    "potential logarithm": fixed(Potential(logarithm=True), Essential()),
     "lagged": fixed(Concentration(), Lagged()),
     "lagged inner layer": fixed(Concentration(), Lagged(InnerLayer())),
     "lagged averaged": fixed(Concentration(), Lagged(Averaged())),
@@ -383,7 +382,7 @@ STYLES = {
     "nitsche without adjoint": ("0.5", ":", "v"), "potential penalty": ("0.5", "-", "D"),
 }  # fmt: skip
 MARKS = {
-    "nitsche skew without penalty": "^", "multiplier": "s", "potential essential": "D", "potential logarithm": "d",
+    "nitsche skew without penalty": "^", "multiplier": "s", "potential essential": "D",
     "lagged": "x", "lagged inner layer": "+", "lagged averaged": "1", "lagged least squares": "2", "frozen": "*",
 }  # fmt: skip
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import ClassVar
 
-from ngsolve import H1, CoefficientFunction, FESpace, InnerProduct, Mesh, exp, log
+from ngsolve import H1, CoefficientFunction, FESpace, InnerProduct, Mesh
 
 from ngswell import donnan, laws
 from ngswell.baths import Bath, BathFields, Essential, Penalty
@@ -23,37 +23,27 @@ class State(SolidState):
 
     P: CoefficientFunction
     salt: CoefficientFunction
-    """The unknown: c̃, or ln c̃."""
-    logarithm: bool
-
-    @cached_property
-    def bath(self) -> CoefficientFunction:
-        """c̃ [mol/l]."""
-        return exp(self.salt) if self.logarithm else self.salt
 
     @cached_property
     def pore_pressure(self) -> CoefficientFunction:
         """Overall pressure p, eq. (38) for that bath and the charge at the point [N/mm²]."""
         m = self.material
-        return donnan.pressure(self.bath, self.pointwise_charge, m.RT, self.P, m.Gamma, m.phi, m.phi_bath)
+        return donnan.pressure(self.salt, self.pointwise_charge, m.RT, self.P, m.Gamma, m.phi, m.phi_bath)
 
     @cached_property
     def cations(self) -> CoefficientFunction:
         """c₊ of (23)₁ for that bath [mol/l]."""
-        return donnan.cations(self.bath, self.pointwise_charge, self.material.Gamma)
+        return donnan.cations(self.salt, self.pointwise_charge, self.material.Gamma)
 
     @cached_property
     def anions(self) -> CoefficientFunction:
         """c₋ [mol/l]."""
-        return donnan.anions(self.bath, self.pointwise_charge, self.material.Gamma)
+        return donnan.anions(self.salt, self.pointwise_charge, self.material.Gamma)
 
     def transport(self, frame: CoefficientFunction) -> laws.Transport:
         """Fluxes from gradients in the `frame` (a matrix on reference gradients): `pull` or `push`."""
-        gradient = self.kinematics.flow_gradient(self.salt)
-        grad_bath = self.bath * gradient if self.logarithm else gradient
-        return laws.transport_by_potentials(
-            self.material, self.nF, self.bath, self.pointwise_charge, frame * self.drive(self.P), frame * grad_bath
-        )
+        gradients = (frame * self.drive(self.P), frame * self.kinematics.flow_gradient(self.salt))
+        return laws.transport_by_potentials(self.material, self.nF, self.salt, self.pointwise_charge, *gradients)
 
     def outputs(self) -> dict[str, CoefficientFunction]:
         """Named fields in the current configuration; `ngswell.models.OUTPUT_UNITS` has their units."""
@@ -61,7 +51,7 @@ class State(SolidState):
         return {
             **self.solid_outputs(self.pore_pressure),
             "p": self.pore_pressure,
-            "hydraulic_pressure": self.P - 2 * self.material.phi_bath * self.material.RT * self.bath,
+            "hydraulic_pressure": self.P - 2 * self.material.phi_bath * self.material.RT * self.salt,
             "c_plus": self.cations,
             "c_minus": self.anions,
             "cfc": self.pointwise_charge,
@@ -77,11 +67,9 @@ class Potential:
     c̃ and P are those of the bath with which the point would be in Donnan equilibrium: c₊ c₋ = (Γ c̃)² and p = p_D(c̃, cfc, P),
     eqs. (23), (38). They stand for the chemical potentials of salt and fluid. A bath prescribes them whatever the
     deformation, and no gradient of the charge is left; ions and overall pressure follow from the charge at the point.
-    `logarithm` makes ln c̃ the third unknown, which keeps c̃ positive.
     """
 
     order: int = 2
-    logarithm: bool = False
 
     unknowns: ClassVar[tuple[str, ...]] = ("u", "P", "salt")
     balances: ClassVar[tuple[str, ...]] = ("momentum", "fluid", "cations")
@@ -103,11 +91,10 @@ class Potential:
         return FESpace([kinematics.space(mesh, self.order, held), Q, Q])
 
     def state(self, functions: Sequence[CoefficientFunction], setting: Setting) -> State:
-        u, P, salt = functions
-        return State(setting, u, P, salt, self.logarithm)
+        return State(setting, *functions)
 
     def equilibrium(self, bath: BathFields, cfc: CoefficientFunction, material: Material) -> dict[str, CoefficientFunction]:
-        return {"P": bath.P, "salt": log(bath.c) if self.logarithm else bath.c}
+        return {"P": bath.P, "salt": bath.c}
 
     def terms(self, state: State, tests: Sequence[CoefficientFunction]) -> list[Term]:
         v, q, d = tests
@@ -122,10 +109,10 @@ class Potential:
         ]
 
     def excess(self, state: State, bath: BathFields) -> dict[str, CoefficientFunction]:
-        return {"fluid": state.P - bath.P, "cations": state.bath - bath.c}
+        return {"fluid": state.P - bath.P, "cations": state.salt - bath.c}
 
     def references(self, concentration: float, stress: float, length: float) -> dict[str, float]:
-        return {"u": length, "P": stress, "salt": 1.0 if self.logarithm else concentration}
+        return {"u": length, "P": stress, "salt": concentration}
 
     def bounds(self, state: State) -> dict[str, CoefficientFunction]:
-        return {"fluid content J − nS0": state.content, "salt concentration c̃": state.bath}
+        return {"fluid content J − nS0": state.content, "salt concentration c̃": state.salt}

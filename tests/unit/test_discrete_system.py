@@ -105,7 +105,6 @@ DISCRETISATIONS = {
     "Concentration, Multiplier beside Nitsche": (Concentration(), Multiplier(), NITSCHE[0]),
     "Potential, Penalty": (Potential(), Penalty(3.0), Penalty(relative=10.0)),
     "Potential, order 3": (Potential(3), Penalty(3.0), Penalty(relative=10.0)),
-    "Potential, logarithm": (Potential(logarithm=True), Penalty(3.0), Penalty(relative=10.0)),
 }
 SIZES = {
     "u": 0.02,

@@ -82,7 +82,6 @@ def test_ledger_closes(treatment, order):
         (Potential(), Essential()),
         (Potential(3), Essential()),
         (Potential(), Penalty(relative=1e3)),
-        (Potential(logarithm=True), Essential()),
         (Concentration(), Nitsche()),
         (Concentration(), Nitsche(0.0, "skew")),
         (Concentration(3), Nitsche(adjoint="none")),
@@ -134,7 +133,7 @@ def test_models_name_their_outputs_alike():
 
 @pytest.mark.parametrize(
     ("model", "treatment"),
-    [(Potential(), None), (Potential(logarithm=True), None), (Concentration(), Multiplier()), (Concentration(), Nitsche())],
+    [(Potential(), None), (Concentration(), Multiplier()), (Concentration(), Nitsche())],
 )
 def test_a_run_goes_on_from_its_end(model, treatment):
     def scene():

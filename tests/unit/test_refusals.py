@@ -196,6 +196,8 @@ def test_symmetry_needs_a_straight_boundary():
         (lambda: Penalty(math.nan), "positive"),
         (lambda: Penalty(0.0), "positive and finite, got 0.0"),
         (lambda: Penalty(relative=-1e3), "positive and finite, got -1000.0"),
+        (lambda: Penalty("40"), "positive and finite, got .40."),
+        (lambda: Nitsche("20"), "gamma has to be positive and finite, got .20."),
         (lambda: Nitsche(0.0), "adjoint 'symmetric': gamma has to be positive and finite, got 0.0"),
         (lambda: Nitsche(0.0, "none"), "adjoint 'none': gamma has to be positive"),
         (lambda: Nitsche(-1.0, "skew"), "adjoint 'skew': gamma has to be at least 0 and finite, got -1.0"),

@@ -89,17 +89,8 @@ def test_block_after_a_ramp(choice, end):
     assert areas[-1] / areas[0] > 1.5
 
 
-UNLIFTED = pytest.mark.xfail(strict=True, reason="values are prescribed in full before Newton's first iteration")
-
-
 @pytest.mark.parametrize(
-    "choice",
-    [
-        "Concentration, Multiplier",
-        "Concentration, Nitsche",
-        pytest.param("Potential", marks=UNLIFTED),
-        "Potential, Penalty",
-    ],
+    "choice", ["Concentration, Multiplier", "Concentration, Nitsche", "Potential", "Potential, Penalty"]
 )
 def test_block_at_once(choice):
     areas = diluted_area(choice, 1e-2, 0.0, 50.0)

@@ -165,7 +165,7 @@ def turned(angle):
         material=TABLE_2,
         charge=Ramp((0, 0.0), (100, 1.0)),
         supports=[Pin(place(0, 0), "xy"), Pin(place(1, 0), "y")],
-        baths=[Bath("top|left", c=Ramp((100, 4.1), (150, 1.0)), treatment=Penalty(1.0))],
+        baths=[Bath("top|left", c=Ramp((100, 4.1), (150, 2.0)), treatment=Penalty(1.0))],
     )
     area, corner = Area(), Probe(place(1, 1), "J", "p", "c_plus", "cfc")
     scene.run(200.0, Fixed(25.0), [area, corner])

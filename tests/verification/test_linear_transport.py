@@ -166,7 +166,6 @@ def test_decay_rates_to_round_off():
 
 EXACT_BATHS = {
     "Potential": {"model": Potential(order=5), "treatment": None},
-    "Potential, logarithm": {"model": Potential(order=5, logarithm=True), "treatment": None},
     "Multiplier": {"model": Concentration(order=5), "treatment": Multiplier()},
     "Nitsche": {"model": Concentration(order=5), "treatment": Nitsche()},
 }
@@ -297,7 +296,7 @@ def test_step_of_the_bath_to_the_bias_of_the_penalty():
     assert deviations(found, closed_response(**run, step=5.0)).max() < 3e-7
 
 
-@pytest.mark.parametrize("model", [Potential(5), Potential(5, logarithm=True), Concentration(5)])
+@pytest.mark.parametrize("model", [Potential(5), Concentration(5)])
 def test_step_of_the_bath_without_bias(model):
     treatment = Multiplier() if isinstance(model, Concentration) else None
     run = {"until": 50.0, "dt": 5.0}

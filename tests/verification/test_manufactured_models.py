@@ -80,11 +80,6 @@ def test_orders_in_space_with_a_bath(kind, order, bath):
     check(*observed_orders(kind, order, bath=bath, **POTENTIAL), potential_orders(order))
 
 
-def test_orders_in_space_of_the_logarithm():
-    bath = exact_bath(Essential())
-    check(*observed_orders("plane strain", 3, bath=bath, logarithm=True, **POTENTIAL), potential_orders(3))
-
-
 @pytest.mark.parametrize("kind", ["plane strain", "ring"])
 def test_order_in_time(kind):
     # Quartic u on 3 × 3 cells: the mesh's error is below 1e-3 of that of the steps.
