@@ -433,8 +433,11 @@ def draw_sweeps(axes: Axes, rows: Sequence[Row]) -> None:
 
 
 def draw_failures(axes: Axes, values: Sequence[float], colour: str, marker: str) -> None:
-    axes.plot(values, [1.0] * len(values), marker=marker, ls="", ms=5, mfc="none", mec=colour,
+    if not values:
+        return
+    (marks,) = axes.plot(values, [1.0] * len(values), marker=marker, ls="", ms=5, mfc="none", mec=colour,
               transform=axes.get_xaxis_transform(), clip_on=False)  # fmt: skip
+    marks.set_in_layout(False)
 
 
 def draw_costs(axes: Axes, case: Case, rows: Sequence[Row]) -> None:
