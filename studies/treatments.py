@@ -36,7 +36,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.ticker import NullFormatter
+from matplotlib.ticker import LogLocator, NullFormatter, ScalarFormatter
 from ngsolve import Mesh
 from numpy.typing import NDArray
 from tqdm import tqdm
@@ -404,6 +404,9 @@ def draw(scenes: Sequence[Case], rows: Sequence[Row]) -> Figure:
     for axes in grid.flat:
         axes.xaxis.set_minor_formatter(NullFormatter())
         axes.yaxis.set_minor_formatter(NullFormatter())
+    for axes in grid[1]:
+        axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+        axes.xaxis.set_major_formatter(ScalarFormatter())
     for axes in grid[:, 0]:
         axes.set_ylabel("largest relative error")
     handles = [
