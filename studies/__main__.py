@@ -13,7 +13,7 @@ from ngswell.plotting import use_style
 from studies.output import prepare, write
 
 PAPER = ("boundary_charge", "oscillation", "free_swelling")
-STUDIES = (*PAPER, "cylinder", "reductions", "stability", "treatments", "verification")
+STUDIES = (*PAPER, "convergence", "cylinder", "reductions", "stability", "treatments", "verification")
 
 
 def main(arguments: list[str] | None = None) -> int:
