@@ -4,8 +4,8 @@ Variants, made here: `present` (as in ngswell), `smooth` (the smooth p in the mo
 local Donnan equilibrium), `elementwise` (smooth p, and the charge at the point with its elementwise gradient, from second
 derivatives of u, in fluxes and baths: no charge field), `elementwise_pointwise` (the same with the present pressure).
 
-First a gel of Table 2 held sideways, its surface free of stress: F = diag(1, J). Then such a gel at rest, disturbed. Last the
-free-swelling scene from its state at 7000 s. Numbers, V a variant, N the cells a side, each of 0.05 mm:
+First a gel of Table 2 held sideways, its surface free of stress: F = diag(1, J). Then such a gel at rest, disturbed. Last
+the free-swelling scene from its state at 7000 s. Numbers, V a variant, N the cells a side, each of 0.05 mm:
 
 - `V_eigenvalue_N_J_...`: smallest eigenvalue of the momentum's tangent on displacements that move no fluid as far as the
   discrete p can see, in units of µ |Grad v|², at that J; `V_negative_N_J_...`: how many are negative;
@@ -34,7 +34,24 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
-from ngsolve import CF, BilinearForm, CoefficientFunction, Cof, Grad, Id, InnerProduct, Norm, ds, dx, specialcf, x, y
+from ngsolve import (
+    CF,
+    ET,
+    VOL,
+    BilinearForm,
+    CoefficientFunction,
+    Cof,
+    Grad,
+    Id,
+    InnerProduct,
+    IntegrationRule,
+    Norm,
+    ds,
+    dx,
+    specialcf,
+    x,
+    y,
+)
 from numpy.typing import NDArray
 
 from ngswell import (
@@ -544,9 +561,14 @@ def draw_mode(axes: Axes, cells: int) -> None:
     problem = held_sideways("smooth", cells, 0.3).problem
     swell(problem, homogeneous_equilibrium(TABLE_2, 0.3, "confined").J, 0.3)
     found = undrained(problem)
-    problem.vector[problem.ranges["u"]] += 0.4 * CELL * found.mode / np.abs(found.mode).max()
-    picture = on_deformed_body(problem, problem.state.J, cuts=4)
+    flat = problem.vector[problem.ranges["u"]].copy()
+    problem.vector[problem.ranges["u"]] = found.mode
+    largest = np.abs(problem.state.u(problem.mesh.MapToAllElements({ET.QUAD: IntegrationRule(ET.QUAD, 8)}, VOL))).max()
+    problem.vector[problem.ranges["u"]] = flat + 0.3 * CELL / largest * found.mode
+    picture = on_deformed_body(problem, problem.state.J, cuts=6)
     show(axes, picture, f"mode of smooth p, J = 2.10: {found.values[0]:.2f} µ")
+    top = float(picture.mesh.y.max())
+    axes.set(xlim=(-0.01, cells * CELL + 0.01), ylim=(top - 0.3, top + 0.02))
 
 
 def draw_end(axes: Axes, done: Passage | None) -> None:
