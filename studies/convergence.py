@@ -9,7 +9,8 @@ the free-swelling scene from its state at 7000 s. Numbers, V a variant, N the ce
 
 - `V_eigenvalue_N_J_...`: smallest eigenvalue of the momentum's tangent on displacements that move no fluid as far as the
   discrete p can see, in units of µ |Grad v|², at that J; `V_negative_N_J_...`: how many are negative;
-- `V_critical_J_N`: where the smallest passes zero; `biot_critical_J`: closed form, surface of an incompressible half-space;
+- `V_critical_J_N`: where the smallest passes zero; closed forms for the surface of a half-space: `biot_critical_J`
+  (incompressible), `solid_critical_J` (the solid's bulk stiffness alone), `drained_critical_J` (at rest with its bath);
 - `V_held_eigenvalue_N`: the smallest at J = 3 with the surface held: the control, positive;
 - `V_growth_N_bath_C`: fastest growth rate [1/s] of small perturbations at rest in C mol/l, `V_growing_N_bath_C`: how many;
 - `V_measured_growth`: rate [1/s] at which the disturbed gel (4 × 4, 0.1 mol/l, steps of 1 ms) leaves its state of rest;
@@ -264,14 +265,38 @@ def zero_crossing(J: Sequence[float], values: Sequence[float]) -> float:
     return J[-1]
 
 
-def biot() -> float:
-    """J = λ₂/λ₁ at which the surface of an incompressible neo-Hookean half-space wrinkles (plane strain, Biot 1963).
+def bulk_stiffness(J: float, bath: float | None) -> float:
+    """g″ of the energy µ/2 |F|² + g(J) [N/mm²]: the solid's and, drained to a `bath` [mol/l], −dp_D/dJ of (38)."""
+    m = TABLE_2
+    solid = m.mu / J**2 + m.lam * (1 - m.nS0) ** 2 / (J - m.nS0) ** 2
+    if bath is None:
+        return solid
+    cfc = (1 - m.nS0) * m.cfc0 / (J - m.nS0)
+    return solid + m.RT * cfc**2 / (2 * (J - m.nS0) * float(np.sqrt(bath**2 + cfc**2 / 4)))
 
-    r = λ₁/λ₂ is the real root of r³ + r² + 3 r − 1 = 0. The bulk part of the energy does no work without change of
-    volume, so the gel of F = diag(1, J) whose fluid has no time to move is such a solid.
+
+def wrinkling(J: float, stiffness: float) -> float:
+    """Positive where the free surface of a half-space with F = diag(1, J) stays flat (plane strain), zero where it wrinkles.
+
+    Displacements exp(ikX + ksY) of the half-space Y < 0 of energy µ/2 |F|² + g(J), free of stress at rest, have s = 1 and
+    s² = (µ + g″J²)/(µ + g″); both parts of the traction vanish where 4 J² s = (1 + J²)². The length of the wrinkles is
+    free. For g″ → ∞ this is Biot's surface, J = 3.383.
     """
-    roots = np.roots([1.0, 1.0, 3.0, -1.0])
-    return float(1 / roots[np.abs(roots.imag) < 1e-12].real[0])
+    s = np.sqrt((TABLE_2.mu + stiffness * J**2) / (TABLE_2.mu + stiffness))
+    return float(4 * J**2 * s - (1 + J**2) ** 2)
+
+
+def closed_forms() -> dict[str, float]:
+    """J at which surfaces wrinkle: incompressible; at rest with its bath, drained; with the solid's bulk stiffness alone."""
+    J = np.linspace(1.05, 5, 4000).tolist()
+    baths = np.geomspace(0.05, 1.0, 60)[::-1]
+    rest = [homogeneous_equilibrium(TABLE_2, bath, "confined").J for bath in baths]
+    drained = [wrinkling(a, bulk_stiffness(a, bath)) for a, bath in zip(rest, baths, strict=True)]
+    return {
+        "biot_critical_J": zero_crossing(J, [wrinkling(a, 1e9) for a in J]),
+        "drained_critical_J": zero_crossing(rest, drained),
+        "solid_critical_J": zero_crossing(J, [wrinkling(a, bulk_stiffness(a, None)) for a in J]),
+    }
 
 
 # -- a disturbed state of rest ---------------------------------------------------------------------------------------------
@@ -430,7 +455,8 @@ def cases(quick: bool) -> list[Case]:
 def run(quick: bool = False) -> Findings:
     """Eigenvalues, growth, a disturbance, and the scene."""
     meshes = (4, 8) if quick else (4, 8, 12)
-    numbers: dict[str, float | int | str] = {"biot_critical_J": biot()}
+    exact = closed_forms()
+    numbers: dict[str, float | int | str] = {**exact}
     rows: list[tuple[object, ...]] = []
     clock = perf_counter()
 
@@ -496,7 +522,7 @@ def run(quick: bool = False) -> Findings:
         "newton_iterations": sum(d.iterations for d in passages),
         "seconds": round(perf_counter() - clock, 2),
     }
-    figure = draw(spectra, meshes, (at_rest, growth), courses, passages)
+    figure = draw(exact, spectra, meshes, (at_rest, growth), courses, passages)
     return Findings(figure, ("what", "variant", "size", "at", "value", "count"), rows, numbers)
 
 
@@ -521,7 +547,9 @@ GREY = {"present": "0.0", "smooth": "0.5", "elementwise": "0.35", "elementwise_p
 STYLE = {4: ":", 8: "--", 12: "-"}
 
 
-def draw(spectra: Any, meshes: Sequence[int], rates: Any, courses: Any, passages: Sequence[Passage]) -> Figure:
+def draw(
+    exact: dict[str, float], spectra: Any, meshes: Sequence[int], rates: Any, courses: Any, passages: Sequence[Passage]
+) -> Figure:
     """Eigenvalues, growth, disturbance above; the mode, the body where a run ended, and how far runs came below."""
     figure = plt.figure(figsize=(9.6, 6.4))
     grid = figure.add_gridspec(2, 3)
@@ -529,8 +557,15 @@ def draw(spectra: Any, meshes: Sequence[int], rates: Any, courses: Any, passages
     for (name, cells), values in spectra.items():
         eigen.plot(STRETCHES, values, STYLE[cells], color=GREY[name], lw=1.2, label=f"{name}, {cells} × {cells}")
     eigen.axhline(0, color="k", lw=0.6)
-    eigen.axvline(biot(), color="k", lw=0.6, ls="-.")
-    eigen.annotate("Biot", (biot(), eigen.get_ylim()[1]), (2, -10), textcoords="offset points", fontsize=8)
+    for axes, key, text in (
+        (eigen, "biot_critical_J", "incompressible"),
+        (eigen, "solid_critical_J", "solid alone"),
+        (grow, "drained_critical_J", "drained"),
+    ):
+        axes.axvline(exact[key], color="k", lw=0.6, ls="-.")
+        axes.annotate(
+            text, (exact[key], 0.98), (-8, 0), ("data", "axes fraction"), "offset points", rotation=90, va="top", fontsize=6
+        )
     eigen.set(xlabel="J, held sideways", ylabel=r"smallest eigenvalue / $\mu|\mathrm{Grad}\,v|^2$", title="without flow")
     eigen.legend(fontsize=7)
 
