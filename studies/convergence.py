@@ -1,9 +1,9 @@
 """Why Newton's method may stop converging while a gel swells freely: three discretisations of one model.
 
-Variants: `present` (`Concentration` as it is), and made here `smooth` (the smooth p in the momentum balance in place of the
-pressure of local Donnan equilibrium), `elementwise` (smooth p, and the charge at the point with its elementwise gradient, from
-second derivatives of u, in fluxes and baths: no charge field), `elementwise_pointwise` (the same with the present pressure).
-The runs also have `potential`, the toolkit's default model with exact baths.
+Variants: `present` (`Concentration` as it is), and made here `smooth` (the smooth p in the momentum balance in place of
+the pressure of local Donnan equilibrium), `elementwise` (smooth p, and the charge at the point with its elementwise
+gradient, from second derivatives of u, in fluxes and baths: no charge field), `elementwise_pointwise` (the same with the
+present pressure). The runs also have `potential`, the toolkit's default model with exact baths.
 
 First a gel of Table 2 held sideways, its surface free of stress: F = diag(1, J). Then such a gel at rest, disturbed. Last
 the free-swelling scene from its state at 7000 s. Numbers, V a variant, N the cells a side, each of 0.05 mm:
