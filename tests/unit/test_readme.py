@@ -11,5 +11,5 @@ def test_the_scene_of_the_readme_runs(capsys):
     assert len(code) == 1
     exec(compile(code[0], str(README), "exec"), {"__name__": "readme"})
     printed = capsys.readouterr().out
-    assert "efflux on top|left|bottom" in printed
+    assert "bath on top|left|bottom: prescribed" in printed
     assert "weight" not in printed
