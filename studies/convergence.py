@@ -591,13 +591,16 @@ def draw(
     eigen.axhline(0, color="k", lw=0.6)
     for axes, key, text in (
         (eigen, "biot_critical_J", "incompressible"),
-        (eigen, "solid_critical_J", "solid alone, drained"),
-        (grow, "drained_critical_J", "drained, closed form"),
+        (eigen, "solid_critical_J", "solid alone"),
+        (grow, "drained_critical_J", "closed form"),
     ):
         axes.axvline(exact[key], color="k", lw=0.6, ls="-.")
+        place = (exact[key], 0.02 if axes is grow else 0.98)
+        up = "bottom" if axes is grow else "top"
         axes.annotate(
-            text, (exact[key], 0.98), (-7, 0), ("data", "axes fraction"), "offset points", rotation=90, va="top", fontsize=6
-        )
+            text, place, (2, 0), ("data", "axes fraction"), "offset points", rotation=90, va=up, fontsize=6,
+            bbox={"fc": "w", "ec": "none", "pad": 0.5},
+        )  # fmt: skip
     eigen.set(xlabel="J, held sideways", ylabel=r"smallest eigenvalue / $\mu|\mathrm{Grad}\,v|^2$", title="without flow")
     eigen.legend(fontsize=6.5, loc="lower left")
 
@@ -667,11 +670,11 @@ def draw_reached(axes: Axes, passages: Sequence[Passage]) -> None:
         shade = "0.3" if not done.passed else "0.6" if done.failures else "0.85"
         axes.barh(place, share, color=shade, edgecolor="k", lw=0.4)
         nx, ny = done.case.cells
-        name = done.case.variant.replace("elementwise_pointwise", "elementwise, pointwise p")
+        name = done.case.variant.replace("elementwise_pointwise", "elementwise, point p")
         text = f"{name}, {nx}×{ny}, {done.case.step:g} s" + ", undamped" * done.case.undamped
         text += ", disturbed" * bool(done.case.noise)
         verdict = f": rejects at {done.failures[0][0]:.0f} s" if done.failures else ""
         verdict = verdict if done.passed else f": ends at {done.reached:.2f} s"
-        axes.annotate(text + verdict, (0.02, place), va="center", fontsize=6, color="k" if done.passed else "w")
+        axes.annotate(text + verdict, (0.02, place), va="center", fontsize=5.2, color="k" if done.passed else "w")
     axes.set(xlim=(0, 1.0), yticks=[], xlabel="share of the wanted time reached", title="free swelling")
     axes.grid(False)
