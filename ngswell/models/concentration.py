@@ -65,8 +65,8 @@ class Concentration:
     and boundary conditions use that field, and the total charge is exact.
 
     In exchange the smooth p does not see J vary inside an element, and a swollen gel owes most of its bulk stiffness to
-    that: where fast swelling outruns the mesh, elements would buckle inside. The momentum balance therefore takes the
-    pressure that local Donnan equilibrium gives for the charge at the point (`State.pore_pressure`); the difference
+    that: where fast swelling outruns the mesh, the cells at the surface would wrinkle. The momentum balance therefore takes
+    the pressure that local Donnan equilibrium gives for the charge at the point (`State.pore_pressure`); the difference
     vanishes with the mesh size.
     """
 

@@ -155,7 +155,7 @@ def undrained_stiffness(cells):
     return np.linalg.eigvalsh(kernel.T @ tangent[np.ix_(u, u)] @ kernel)[0]
 
 
-def test_swollen_cells_do_not_buckle_inside(monkeypatch):
+def test_a_swollen_surface_does_not_wrinkle_early(monkeypatch):
     """The osmotic pressure of the charge at the point keeps the undrained tangent positive; the smooth p alone does not,
     and a finer mesh makes it worse: small steps through fast swelling then follow a growth that is not there."""
     assert undrained_stiffness(4) > 0
