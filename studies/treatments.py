@@ -11,7 +11,7 @@ over fourteen decades, in units of K/h for p and of D₊/h for c. The CSV has ev
   relative to p_D and c_D;
 - `iterations`, `rejected`, `seconds`: Newton iterations, rejected steps, seconds of the time loop;
 - `growth`: dominant eigenvalue of one step about the state at the start (strip); beyond ±1 the treatment is unstable;
-- `outcome`: "passes", or the time at which a step failed, or passed with less than a sixteenth of its size only [s].
+- `outcome`: "passes", or the time at which a step failed for good, or the seventh time in the run [s].
 
 Numbers (SCENE is column, strip or block; TREATMENT its name in the CSV; on the middle mesh unless stated):
 
@@ -140,14 +140,17 @@ class Condition(Observer):
 
 
 class Patience(Observer):
-    """Ends a run whose step had to be divided by more than sixteen: it would creep on for hours."""
+    """Ends a run that has rejected more than six steps: it would creep on for long."""
+
+    rejected = 0
 
     def record(self, problem: Problem, time: float) -> None:
         pass
 
     def observe(self, problem: Problem, report: StepReport) -> None:
-        if len(report.rejected) > 2:
-            raise StepError(report.time, report.dt, "", (), f"{len(report.rejected)} rejections", "")
+        self.rejected += len(report.rejected)
+        if self.rejected > 6:
+            raise StepError(report.time, report.dt, "", (), f"{self.rejected} rejections", "")
 
 
 @dataclass(frozen=True)
