@@ -175,7 +175,7 @@ def draw(cylinder: Course, cuboid: Course) -> Figure:
     for column, state in enumerate(cylinder.pictures.states):
         ax = figure.add_subplot(grid[0, column])
         cylinder.scene.problem.restore(state)
-        half = on_deformed_body(cylinder.scene.problem, cylinder.scene.problem.state.p)
+        half = on_deformed_body(cylinder.scene.problem, cylinder.scene.problem.state.pore_pressure)
         for part in (half, half.mirrored(0.0)):
             ax.tricontourf(part.mesh, part.values, levels=LEVELS, norm=norm, extend="both")
             ax.add_collection(LineCollection(list(part.outlines), colors="k", linewidths=0.12))
@@ -217,5 +217,5 @@ def surface(body: Scene, cuts: int = 3) -> tuple[NDArray, NDArray]:
     corner = np.array([row * n + column for row in range(cuts) for column in range(cuts)])
     pieces = np.stack([corner, corner + 1, corner + n + 1, corner + n], 1)
     position = (CF((x, y, z)) + problem.state.u)(where).reshape(-1, n * n, 3)
-    pressure = problem.state.p(where).reshape(-1, n * n)
+    pressure = problem.state.pore_pressure(where).reshape(-1, n * n)
     return position[:, pieces].reshape(-1, 4, 3), pressure[:, pieces].mean(axis=2).ravel()
