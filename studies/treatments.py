@@ -15,9 +15,12 @@ over fourteen decades, in units of K/h for p and of D₊/h for c. The CSV has ev
 
 Numbers (SCENE is column, strip or block; TREATMENT its name in the CSV; on the middle mesh unless stated):
 
-- `SCENE_TREATMENT_plateau`: smallest error over the decades; `..._from`, `..._to`: the range of ε or γ (units of K/h) whose
-  error is within 10 % of it; treatments without parameter have `SCENE_TREATMENT_error`;
-- `SCENE_TREATMENT_condition`: distance from the condition at the plateau (the smallest over the decades);
+- `SCENE_TREATMENT_plateau`: error at the largest ε or γ that passes (smaller ones may come closer, where the error of the
+  treatment cancels that of the mesh); `..._from`, `..._to`: range (units of K/h) throughout which it is within 10 % of that;
+  treatments without parameter have `SCENE_TREATMENT_error`;
+- `SCENE_TREATMENT_condition`: smallest distance from the condition over the decades. On the block that is the kink of the
+  blended baths within a cell;
+- `SCENE_TREATMENT_iterations`: Newton iterations, median over the decades;
 - `SCENE_TREATMENT_failures`: runs that fail, of all meshes and decades;
 - `strip_TREATMENT_growth`: largest |growth| over the decades;
 - `SCENE_reference_error`: distance between the reference and one on a mesh 1.5 times coarser;
@@ -362,11 +365,13 @@ def summary(case: Case, name: str, rows: list[Row]) -> dict[str, float | int]:
         return found
     found[f"{prefix}_condition"] = min(r.condition for r in middle)
     found[f"{prefix}_iterations"] = int(np.median([r.iterations for r in middle]))
-    least = min(r.error for r in middle)
     if not CHOICES[name].swept:
-        return found | {f"{prefix}_error": least}
-    within = [r.value for r in middle if r.value is not None and r.error <= 1.1 * least]
-    return found | {f"{prefix}_plateau": least, f"{prefix}_from": min(within), f"{prefix}_to": max(within)}
+        return found | {f"{prefix}_error": middle[0].error}
+    swept = sorted((r.value, r.error) for r in middle if r.value is not None)
+    plateau = swept[-1][1]
+    beside = [value for value, error in swept if not plateau / 1.1 <= error <= 1.1 * plateau]
+    first = min(value for value, _ in swept if value > max(beside, default=0.0))
+    return found | {f"{prefix}_plateau": plateau, f"{prefix}_from": first, f"{prefix}_to": swept[-1][0]}
 
 
 def paper_in_natural_units() -> dict[str, float]:
@@ -390,7 +395,7 @@ MARKS = {
 }  # fmt: skip
 
 
-BESIDE = 1e15
+BESIDE = 1e14
 """Where on the axis of ε the treatments without parameter stand."""
 
 
@@ -430,12 +435,15 @@ def draw_sweeps(axes: Axes, rows: Sequence[Row]) -> None:
             axes.loglog(*zip(*good, strict=True), color=colour, ls=line, marker=marker, ms=3.5, lw=1)
         draw_failures(axes, [r.value for r in mine if r.value and r.failed is not None], colour, marker)
     for r in rows:
-        if r.treatment in MARKS and r.failed is None:
-            axes.loglog(BESIDE, r.error, "k", marker=MARKS[r.treatment], ls="", ms=5)
-        elif r.treatment in MARKS:
-            draw_failures(axes, [BESIDE], "k", MARKS[r.treatment])
-    axes.axvline(BESIDE / 30, color="0.7", lw=0.8)
-    axes.set_xlim(right=BESIDE * 30)
+        if r.treatment in MARKS:
+            place = BESIDE * 4.0 ** list(MARKS).index(r.treatment)
+            if r.failed is None:
+                axes.loglog(place, r.error, "k", marker=MARKS[r.treatment], ls="", ms=5)
+            else:
+                draw_failures(axes, [place], "k", MARKS[r.treatment])
+    axes.axvline(BESIDE / 10, color="0.7", lw=0.8)
+    axes.set_xlim(right=BESIDE * 4.0 ** len(MARKS))
+    axes.set_xticks([value for value in DECADES if value in (1e-2, 1.0, 1e2, 1e4, 1e6, 1e9, 1e12)])
 
 
 def draw_failures(axes: Axes, values: Sequence[float], colour: str, marker: str) -> None:
