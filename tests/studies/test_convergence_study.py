@@ -83,5 +83,5 @@ def test_every_variant_starts_from_the_same_rest():
 
 def test_large_steps_pass(study):
     numbers, rows = study
-    assert numbers["runs_passed"] == sum(row[0] == "run" for row in rows) == 3
+    assert numbers["runs_passed"] == sum(row[0] == "run" for row in rows) == 4
     assert all(value == -1 for key, value in numbers.items() if key.endswith("first_rejection_s"))
