@@ -7,6 +7,7 @@ enters: weakly, as an efflux, or as prescribed values with a charge known before
 from __future__ import annotations
 
 from dataclasses import dataclass
+from numbers import Real
 from typing import ClassVar, NamedTuple, TypeAlias
 
 from ngsolve import CoefficientFunction
@@ -25,7 +26,7 @@ class BathFields(NamedTuple):
 
 
 def _is_number(value: object) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool)
+    return isinstance(value, Real) and not isinstance(value, bool)
 
 
 @dataclass(frozen=True)

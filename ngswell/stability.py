@@ -62,8 +62,8 @@ def growth_factor(
         problem.initialise()
         if state is not None:
             problem.restore(state)
-        step = _linearised_step(problem, scene.start if state is None else state.time, dt)
         scale = np.concatenate([np.full(r.stop - r.start, problem.references[n]) for n, r in problem.ranges.items()])
+        step = _linearised_step(problem, scene.start if state is None else state.time, dt, scale)
         values, vector = leading_eigenvalues(lambda v: step(v * scale) / scale, scale.size, tolerance, most_steps)
     finally:
         problem.set_time(time)
@@ -75,9 +75,8 @@ def growth_factor(
     return Growth(complex(first.real, abs(first.imag)) if first.imag else first.real, values, mode)
 
 
-def _linearised_step(problem: Problem, time: float, dt: float) -> Callable[[NDArray], NDArray]:
-    """δx_old → δx_new about the step of size `dt` from the problem's fields at `time`."""
-    scale = np.concatenate([np.full(r.stop - r.start, problem.references[n]) for n, r in problem.ranges.items()])
+def _linearised_step(problem: Problem, time: float, dt: float, scale: NDArray) -> Callable[[NDArray], NDArray]:
+    """δx_old → δx_new about the step of size `dt` from the problem's fields at `time`; `scale` is the size of unknowns."""
     residual, change = problem.fields.vec.CreateVector(), problem.fields.vec.CreateVector()
     old = problem.vector.copy()
     solver = LinearSolver(problem.free)
