@@ -134,6 +134,7 @@ def uneven_area(treatment, ratio):
         mesh=uneven(4, ratio),
         kinematics=PlaneStrain(),
         material=TABLE_2,
+        model=Concentration(),
         supports=SYMMETRIC,
         baths=[Bath("top", c=Ramp((0, 1.0), (100, 0.5)), treatment=treatment)],
         charge=Ramp((0, 0.0), (100, 1.0)),
