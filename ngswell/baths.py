@@ -7,13 +7,12 @@ enters: weakly, as an efflux, or as prescribed values with a charge known before
 from __future__ import annotations
 
 from dataclasses import dataclass
-from numbers import Real
 from typing import ClassVar, NamedTuple, TypeAlias
 
 from ngsolve import CoefficientFunction
 
 from ngswell.errors import InputError
-from ngswell.materials import Field, Material
+from ngswell.materials import Field, Material, is_number
 from ngswell.sampling_rules import SamplingRule
 from ngswell.schedules import Schedule, schedule
 
@@ -25,8 +24,9 @@ class BathFields(NamedTuple):
     P: CoefficientFunction
 
 
-def _is_number(value: object) -> bool:
-    return isinstance(value, Real) and not isinstance(value, bool)
+def _per_cell(material: Material, h: Field, multiple: float = 1.0) -> tuple[Field, Field]:
+    """That multiple of K/h [mm³/(N s)] and of D₊/h [mm/s], for cells of the size h [mm] normal to the boundary."""
+    return multiple * material.K / h, multiple * material.D_plus / h
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class Penalty:
         if (self.epsilon is None) == (self.relative is None):
             raise InputError("Penalty takes either epsilon, Penalty(40.0), or relative, Penalty(relative=1e3)")
         value = self.epsilon if self.epsilon is not None else self.relative
-        if not (_is_number(value) and 0 < value < float("inf")):  # type: ignore[operator]
+        if not (is_number(value) and 0 < value < float("inf")):
             raise InputError(f"Penalty has to be positive and finite, got {value!r}")
 
     def __str__(self) -> str:
@@ -58,7 +58,7 @@ class Penalty:
         """ε for p [mm³/(N s)] and for c [mm/s] on a boundary whose cells have the size h [mm]."""
         if self.relative is None:
             return self.epsilon, self.epsilon
-        return self.relative * material.K / h, self.relative * material.D_plus / h
+        return _per_cell(material, h, self.relative)
 
 
 @dataclass(frozen=True)
@@ -79,7 +79,7 @@ class Nitsche:
         if self.adjoint not in ("symmetric", "skew", "none"):
             raise InputError(f"Nitsche: adjoint {self.adjoint!r} is none of 'symmetric', 'skew', 'none'")
         least = "at least 0" if self.adjoint == "skew" else "positive"
-        inside = _is_number(self.gamma) and 0 <= self.gamma < float("inf")
+        inside = is_number(self.gamma) and 0 <= self.gamma < float("inf")
         if not inside or (self.gamma == 0 and self.adjoint != "skew"):
             raise InputError(
                 f"Nitsche with adjoint {self.adjoint!r}: gamma has to be {least} and finite, got {self.gamma!r}"
@@ -90,7 +90,7 @@ class Nitsche:
 
     def factors(self, material: Material, h: Field) -> tuple[Field, Field]:
         """γ K/h [mm³/(N s)] and γ D₊/h [mm/s] for cells of the size h [mm] normal to the boundary."""
-        return self.gamma * material.K / h, self.gamma * material.D_plus / h
+        return _per_cell(material, h, self.gamma)
 
 
 @dataclass(frozen=True)
@@ -107,7 +107,7 @@ class Multiplier:
 
     def factors(self, material: Material, h: Field) -> tuple[Field, Field]:
         """K/h [mm³/(N s)] and D₊/h [mm/s]."""
-        return material.K / h, material.D_plus / h
+        return _per_cell(material, h)
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from typing import Any, NamedTuple, Protocol, TypeAlias
+from typing import Any, NamedTuple, Protocol, TypeAlias, TypeGuard
 
 import numpy as np
 from ngsolve import VOL, CoefficientFunction, Mesh, exp
@@ -203,9 +203,14 @@ def _sample(name: str, law: Any, arguments: tuple[float, ...], example: str) -> 
         raise InputError(f"{name} = {law!r} is not a law {example}") from None
 
 
+def is_number(value: object) -> TypeGuard[float]:
+    """Whether a parameter is one real number, Python's or numpy's, and no truth value."""
+    return isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
+
+
 def _check(name: str, value: object) -> None:
     low, high, unit, hint, zero = _RANGES[name]
-    if isinstance(value, bool) or not isinstance(value, (int, float, np.integer, np.floating)):
+    if not is_number(value):
         raise InputError(f"{name} has to be a number or a CoefficientFunction, got {value!r}")
     number = float(value)
     inside = low < number < high if name == "nS0" else low <= number <= high

@@ -45,7 +45,10 @@ class Newton:
         residual, correction, simplified, right, gap = (problem.fields.vec.CreateVector() for _ in range(5))
 
         def solve(matrix: BaseMatrix, solution: BaseVector) -> bool:
-            gap.FV().NumPy()[:] = problem.gap()
+            excess = problem.gap()
+            if not excess.any():
+                return solver.solve(residual, solution)
+            gap.FV().NumPy()[:] = excess
             right.data = residual - matrix * gap
             solved = solver.solve(right, solution)
             solution.data += gap

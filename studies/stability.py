@@ -49,7 +49,6 @@ from ngswell import (
     PlaneStrain,
     Probe,
     Result,
-    Roller,
     Scene,
     Symmetry,
     Traction,
@@ -60,6 +59,7 @@ from ngswell.analytic import homogeneous_equilibrium, lagged_column_factor
 from ngswell.baths import Treatment
 from ngswell.problem import Problem, Snapshot
 from ngswell.stability import growth_factor
+from studies import oscillation
 from studies.oscillation import disturbed, measured_growth
 from studies.output import Findings, cost
 
@@ -87,16 +87,8 @@ def material(mu: float, cfc0: float = float(TABLE_1.cfc0)) -> Material:
 
 def strip(gel: Material, treatment: Treatment, across: int = 1) -> Scene:
     """The strip of Fig. 8 under the load that holds its reference configuration at rest."""
-    p0 = donnan.pressure(BATH, gel.number("cfc0"), gel.RT)
-    return Scene(
-        mesh=rectangle(0.02, 0.5, across, 30),
-        kinematics=PlaneStrain(),
-        material=gel,
-        model=Concentration(),
-        supports=[Roller("bottom", "y"), Roller("left|right", "x")],
-        baths=[Bath("top", c=BATH, treatment=treatment)],
-        loads=[Traction("top", (0.0, -p0))],
-    )
+    load = Traction("top", (0.0, -donnan.pressure(BATH, gel.number("cfc0"), gel.RT)))
+    return replace(oscillation.scene(treatment), mesh=rectangle(0.02, 0.5, across, 30), material=gel, loads=[load])
 
 
 def block(gel: Material, treatment: Treatment, cells: int = 4) -> Scene:

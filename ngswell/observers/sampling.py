@@ -67,13 +67,13 @@ class Integral(Observer):
 
     def start(self, problem: Problem, begin: float, until: float) -> None:
         quantity = CF(1.0) if self.quantity is None else _output(problem, self.quantity)
-        self._quantity, self._measure = quantity, problem.state.J * problem.kinematics.weight
-        if self.boundary is not None:
+        weight = problem.kinematics.weight
+        if self.boundary is None:
+            self._density = (quantity * problem.state.J * weight).Compile()
+        else:
             problem.scene.check_boundary("Integral", self.boundary)
             cofactor = BoundaryFromVolumeCF(problem.state.cofactor)
-            self._measure = Norm(cofactor * problem.kinematics.normal) * problem.kinematics.weight
-        else:
-            self._density = (quantity * self._measure).Compile()
+            self._quantity, self._measure = quantity, Norm(cofactor * problem.kinematics.normal) * weight
         super().start(problem, begin, until)
 
     def record(self, problem: Problem, time: float) -> None:
