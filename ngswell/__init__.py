@@ -14,16 +14,17 @@ from ngswell.observers import VTK, Area, Integral, Ledger, Probe, Progress, Snap
 from ngswell.sampling_rules import Averaged, InnerLayer, LeastSquares
 from ngswell.scene import Result, Scene
 from ngswell.schedules import Blend, Ramp
+from ngswell.schemes import BACKWARD_EULER, ESDIRK4
 from ngswell.stepping import Adaptive, Fixed
 from ngswell.supports import Pin, Roller, Symmetry, Traction, Weight
 
 __version__ = "0.1.0"
 
 __all__ = [
-    "TABLE_1", "TABLE_2", "VTK", "Adaptive", "Area", "Averaged", "Axisymmetric", "Bath", "Blend", "Concentration",
-    "Confined", "Essential", "Fixed", "Frozen", "HolmesMow", "InnerLayer", "InputError", "Integral", "Lagged",
-    "LeastSquares", "Ledger", "LocalDonnan", "MackieMeares", "Material", "Multiplier", "Newton", "NgswellError",
-    "Nitsche", "OutputError", "Penalty", "Pin", "PlaneStrain", "Potential", "PowerLaw", "Probe", "Progress", "Ramp",
-    "Result", "Roller", "Scene", "Snapshots", "Solid", "StepError", "Symmetry", "Traction", "Uncharged", "Weight",
-    "box", "check_mesh", "column", "from_occ", "read_mesh", "rectangle",
+    "BACKWARD_EULER", "ESDIRK4", "TABLE_1", "TABLE_2", "VTK", "Adaptive", "Area", "Averaged", "Axisymmetric", "Bath",
+    "Blend", "Concentration", "Confined", "Essential", "Fixed", "Frozen", "HolmesMow", "InnerLayer", "InputError",
+    "Integral", "Lagged", "LeastSquares", "Ledger", "LocalDonnan", "MackieMeares", "Material", "Multiplier", "Newton",
+    "NgswellError", "Nitsche", "OutputError", "Penalty", "Pin", "PlaneStrain", "Potential", "PowerLaw", "Probe",
+    "Progress", "Ramp", "Result", "Roller", "Scene", "Snapshots", "Solid", "StepError", "Symmetry", "Traction",
+    "Uncharged", "Weight", "box", "check_mesh", "column", "from_occ", "read_mesh", "rectangle",
 ]  # fmt: skip

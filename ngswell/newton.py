@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import inf
 
 import numpy as np
-from ngsolve import BaseMatrix, BaseVector
+from ngsolve import BaseVector
 
 from ngswell.problem import Problem
 from ngswell.solvers import LinearSolver
@@ -23,13 +24,16 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Newton:
-    """Damped Newton iteration.
+    """Damped Newton iteration, with new or old matrices.
 
     A field has converged when the last correction's largest coefficient is below `tolerance` times the field's reference
     size (`Problem.references`); all fields have to. Steps are halved until the fields are admissible and the simplified
     correction (old matrix, new residual) is smaller than the correction: the natural monotonicity test, which
     does not depend on units or on how equations are scaled. The simplified correction that passes the
     test of convergence is applied as well, so accepted states are about a factor `tolerance` better than tested.
+
+    A factorisation is kept, over iterations, stages and steps, as long as each correction is at most `slowest` times the one
+    before; the error that is left is then estimated as that of a geometric series. With 0, each iteration has its own.
 
     Prescribed values are part of the correction. Put into the fields at once, a sudden change of a bath would be a jump
     across one cell; every step would then start from it, however short.
@@ -38,23 +42,24 @@ class Newton:
     tolerance: float = 1e-8
     most_iterations: int = 15
     least_damping: float = 1 / 64
+    slowest: float = 0.0
 
     def solve(self, problem: Problem, solver: LinearSolver) -> Outcome:
         """Iterate from the fields of `problem`, in place."""
         vector = problem.vector
         residual, correction, simplified, right, gap = (problem.fields.vec.CreateVector() for _ in range(5))
 
-        def solve(matrix: BaseMatrix, solution: BaseVector) -> bool:
+        def solve(solution: BaseVector) -> bool:
             excess = problem.gap()
             if not excess.any():
                 return solver.solve(residual, solution)
             gap.FV().NumPy()[:] = excess
-            right.data = residual - matrix * gap
+            right.data = residual - solver.matrix * gap
             solved = solver.solve(right, solution)
             solution.data += gap
             return solved
 
-        def size(change) -> float:  # type: ignore[no-untyped-def]
+        def size(change: BaseVector) -> float:
             values = change.FV().NumPy()
             return max(float(np.abs(values[problem.ranges[n]]).max()) / problem.references[n] for n in problem.names)
 
@@ -62,35 +67,58 @@ class Newton:
             field, where = problem.worst(correction.FV().NumPy())
             return Outcome(count, reason, field, where)
 
+        def left(change: float) -> float:
+            """What further corrections with the present factorisation would add up to, after one of this size."""
+            rate = solver.contraction
+            return change if rate is None or not self.slowest else change * min(1.0, rate / (1 - rate))
+
         correction[:] = 0.0
         found = problem.inadmissible()
         if found:
             return Outcome(0, f"the step starts with {found[0]} not positive", found[0], found[1])
         problem.residual(residual)
+        renew = not self._may_keep(solver)
+        known = False  # whether `correction` answers the present residual
         for count in range(1, self.most_iterations + 1):
-            matrix = problem.linearise()
-            if not solver.factorise(matrix) or not solve(matrix, correction):
+            if renew and not solver.factorise(problem.linearise()):
+                return failure(count, "the linear system is singular or not finite")
+            if (renew or not known) and not solve(correction):
                 return failure(count, "the linear system is singular or not finite")
             before = size(correction)
-            if before <= self.tolerance:
-                vector -= correction.FV().NumPy()
-                return Outcome(count)
             start = vector.copy()
-            damping = 1.0
+            damping, rate = 1.0, inf
             while True:
                 vector[:] = start - damping * correction.FV().NumPy()
                 refused = problem.inadmissible()
                 if refused is None:
+                    if damping == 1.0 and (before if renew else left(before)) <= self.tolerance:
+                        return Outcome(count)
                     problem.residual(residual)
-                    if solve(matrix, simplified) and size(simplified) <= (1 - damping / 4) * before:
-                        break
+                    if solve(simplified):
+                        rate = size(simplified) / before
+                        if rate <= 1 - damping / 4:
+                            break
+                if not renew:
+                    break
                 damping /= 2
                 if damping < self.least_damping:
                     vector[:] = start
                     if refused:
                         return Outcome(count, f"{refused[0]} would not stay positive", refused[0], refused[1])
                     return failure(count, "Newton's method stalls: no damped step reduces the correction")
-            if damping == 1.0 and size(simplified) <= self.tolerance:
+            if not renew and (refused or not rate < 1):
+                vector[:] = start
+                problem.residual(residual)
+                renew = True
+                continue
+            solver.contraction = max(rate, solver.contraction or 0.0)
+            if damping == 1.0 and left(size(simplified)) <= self.tolerance:
                 vector -= simplified.FV().NumPy()
                 return Outcome(count)
+            known = damping == 1.0 and self._may_keep(solver)
+            renew = not known
+            correction.data = simplified
         return failure(self.most_iterations, f"Newton's method needs more than {self.most_iterations} iterations")
+
+    def _may_keep(self, solver: LinearSolver) -> bool:
+        return solver.ready and (solver.contraction is None or solver.contraction <= self.slowest) and self.slowest > 0

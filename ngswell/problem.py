@@ -121,14 +121,15 @@ class Problem:
         self._system = BilinearForm(self.space)
         self._contents = BilinearForm(self.space)
         for term in self.terms:
-            self._system += self._integral(term, 1 / self.dt if term.kind == "rate" else None)
+            self._system += self.integral(term, 1 / self.dt if term.kind == "rate" else None)
             if term.kind == "rate":
-                self._contents += self._integral(term, None)
+                self._contents += self.integral(term)
         self._charges: dict[str | None, Any] = {None: None}
         if "cfc" in self.names:
             self._charges |= {of: GridFunction(self._component("cfc").space) for of in ("start", "last")}
-        self._old_contents = self.fields.vec.CreateVector()
+        self._old_contents, self._work = (self.fields.vec.CreateVector() for _ in range(2))
         self._prescribed: list[tuple[NDArray, NDArray]] = []
+        self.stages: list[tuple[float, float, NDArray]] = []
 
     # -- forms ---------------------------------------------------------------------------------------------------------
 
@@ -145,7 +146,8 @@ class Problem:
                 terms.append(Term("momentum", "traction", -power, boundary=load.boundary))
         return terms
 
-    def _integral(self, term: Term, factor: Any) -> Any:
+    def integral(self, term: Term, factor: Any = None) -> Any:
+        """A term over its part of the body or of its boundary, for a BilinearForm."""
         factor = self.kinematics.weight if factor is None else factor * self.kinematics.weight
         integrand = (factor * term.integrand).Compile()
         if term.boundary is not None:
@@ -157,7 +159,7 @@ class Problem:
     def form(self, term: Term) -> BilinearForm:
         """One term alone, for ledgers and tests."""
         form = BilinearForm(self.space)
-        form += self._integral(term, None)
+        form += self.integral(term)
         return form
 
     def cell_size(self, boundary: str) -> float:
@@ -220,14 +222,22 @@ class Problem:
         return self.fields.vec.FV().NumPy()
 
     def begin_step(self, time: float, dt: float, guess: NDArray | None = None, charge_share: float = 1.0) -> None:
-        """Prepare the step that ends at `time`: history, parameters, prescribed values; `guess` as first iterate.
+        """Prepare the step of backward Euler from the fields to `time`; `guess` as first iterate.
 
         The prescribed values are not put into the fields: see `gap`.
         """
-        self._contents.Apply(self.fields.vec, self._old_contents)
-        self.dt.Set(dt)
+        self.contents(self._old_contents)
         if "cfc" in self.names:
             self._charges["last"].vec.data = self._component("cfc").vec
+        self._begin(time, dt, guess, charge_share)
+
+    def begin_stage(self, time: float, dt: float, old_contents: NDArray, guess: NDArray) -> None:
+        """Prepare a stage of a Runge–Kutta step: like a step of backward Euler of size `dt` from `old_contents`."""
+        self._old_contents.FV().NumPy()[:] = old_contents
+        self._begin(time, dt, guess)
+
+    def _begin(self, time: float, dt: float, guess: NDArray | None, charge_share: float = 1.0) -> None:
+        self.dt.Set(dt)
         self.set_time(time, charge_share)
         self._prescribed = self._prescribed_values()
         if guess is not None:
@@ -299,6 +309,12 @@ class Problem:
     def contents(self, result: BaseVector) -> None:
         """S at the present fields: its sum over the vertex functions of p or c is the fluid or the salt held."""
         self._contents.Apply(self.fields.vec, result)
+
+    def outflow(self, result: BaseVector) -> None:
+        """R at the present fields and time, which the contents fall by in unit time, on all degrees of freedom."""
+        self._system.Apply(self.fields.vec, result)
+        self._contents.Apply(self.fields.vec, self._work)
+        result.data -= (1 / self.dt.Get()) * self._work
 
     @cached_property
     def _quadrature(self) -> NDArray:

@@ -13,7 +13,7 @@ import numpy as np
 from ngsolve import CoefficientFunction, FESpace, Mesh, TaskManager, specialcf
 from threadpoolctl import threadpool_limits
 
-from ngswell.baths import Bath, Multiplier, Treatment, Weak
+from ngswell.baths import Bath, Lagged, Multiplier, Treatment, Weak
 from ngswell.equilibrium import equilibrate
 from ngswell.errors import InputError
 from ngswell.kinematics import Kinematics
@@ -25,7 +25,8 @@ from ngswell.observers.base import Observer
 from ngswell.problem import Problem, Snapshot
 from ngswell.quadrature import points, vertices, vertices_of
 from ngswell.schedules import Ramp
-from ngswell.stepping import Adaptive, BackwardEuler, Control, StepReport
+from ngswell.schemes import BACKWARD_EULER
+from ngswell.stepping import Adaptive, Control, Stepper, StepReport
 from ngswell.supports import Load, Pin, Roller, Support, Symmetry, Traction, Weight
 
 
@@ -36,6 +37,8 @@ class Result:
     steps: tuple[StepReport, ...]
     end: Snapshot
     seconds: float
+    factorisations: int
+    solves: int
 
     @property
     def iterations(self) -> int:
@@ -198,6 +201,14 @@ class Scene:
             raise InputError(f"Symmetry on {support.boundary!r}: the boundary is not straight along an axis")
         return self.kinematics.directions[axis]
 
+    def _check_scheme(self, control: Control) -> None:
+        for bath in self.baths:
+            if isinstance(self.treatment(bath), Lagged) and control.scheme is not BACKWARD_EULER:
+                raise InputError(
+                    f"bath on {bath.boundary!r}: {self.treatment(bath)} follows the last step, which needs backward Euler, "
+                    f"not {control.scheme}: steps={type(control).__name__}(..., scheme=BACKWARD_EULER)"
+                )
+
     # -- what models and problems ask ----------------------------------------------------------------------------------
 
     def held(self) -> dict[str, str]:
@@ -291,6 +302,7 @@ class Scene:
         if not begin < until < inf:
             raise InputError(f"until = {until:g} s is not a time after the start at {begin:g} s")
         control = Adaptive() if steps is None else steps
+        self._check_scheme(control)
         problem = self.problem
         if resume is not None and resume.values.shape != problem.vector.shape:
             raise InputError(f"resume: the snapshot has {resume.values.size} unknowns, the scene {problem.vector.size}")
@@ -308,7 +320,7 @@ class Scene:
                 for observer in observers:
                     observer.start(problem, begin, until)
                     started.append(observer)
-                stepper = BackwardEuler(problem, control, newton or Newton())
+                stepper = Stepper(problem, control, newton or control.newton)
                 time = begin
                 while time < until:
                     report = stepper.advance(time, kinks, stops)
@@ -319,4 +331,5 @@ class Scene:
         finally:
             for observer in started:
                 observer.finish(problem)
-        return Result(tuple(reports), problem.snapshot(until), perf_counter() - clock)
+        seconds = perf_counter() - clock
+        return Result(tuple(reports), problem.snapshot(until), seconds, stepper.solver.factorisations, stepper.solver.solves)

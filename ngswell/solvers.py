@@ -30,10 +30,15 @@ class LinearSolver:
         self._free = free
         self._matrix: BaseMatrix | None = None
         self._inverse: BaseMatrix | None = None
-        self.factorisations = 0
+        self.factorisations = self.solves = 0
+        self.ready = False
+        """Whether there is a factorisation that may be used again."""
+        self.contraction: float | None = None
+        """The last correction made with the present factorisation over the one before, once there are two."""
 
     def factorise(self, matrix: BaseMatrix) -> bool:
         """Factorise `matrix`; False if it is singular or holds a value that is not finite."""
+        self.ready, self.contraction = False, None
         if not np.isfinite(matrix.AsVector().FV().NumPy()).all():
             return False
         try:
@@ -45,11 +50,18 @@ class LinearSolver:
             self._inverse = None
             return False
         self.factorisations += 1
+        self.ready = True
         return True
+
+    @property
+    def matrix(self) -> BaseMatrix:
+        """What was factorised last."""
+        return self._matrix
 
     def solve(self, right: BaseVector, solution: BaseVector) -> bool:
         """solution = A⁻¹ right; False if the result is not finite."""
         if self._inverse is None:
             raise RuntimeError("factorise before solving")
         solution.data = self._inverse * right
+        self.solves += 1
         return bool(np.isfinite(solution.FV().NumPy()).all())

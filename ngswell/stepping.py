@@ -1,4 +1,4 @@
-"""Backward Euler from kink to kink of the schedules, with fixed or error-controlled steps."""
+"""Time integration from kink to kink of the schedules, with fixed or error-controlled steps."""
 
 from __future__ import annotations
 
@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ngswell.errors import InputError, StepError
-from ngswell.newton import Newton
+from ngswell.newton import Newton, Outcome
 from ngswell.problem import Problem
+from ngswell.schemes import BACKWARD_EULER, ESDIRK4, Scheme
 from ngswell.solvers import LinearSolver
 
 
@@ -27,7 +28,13 @@ class StepReport:
 
 
 class Control(Protocol):
-    """Chooses step sizes [s]."""
+    """Chooses the scheme, how its equations are solved, and step sizes [s]."""
+
+    @property
+    def scheme(self) -> Scheme: ...
+
+    @property
+    def newton(self) -> Newton: ...
 
     def first(self, interval: float, last: float | None) -> float:
         """First step after a kink, when the next kink is `interval` away and `last` was the step before, if any."""
@@ -45,9 +52,14 @@ class Fixed:
     """Steps of one size [s], shortened to land on kinks and where Newton's method fails."""
 
     step: float
+    scheme: Scheme = BACKWARD_EULER
 
     def __post_init__(self) -> None:
         _positive("Fixed step", self.step, "s")
+
+    @property
+    def newton(self) -> Newton:
+        return Newton()
 
     def first(self, interval: float, last: float | None) -> float:
         return self.step
@@ -63,24 +75,39 @@ class Fixed:
 class Adaptive:
     """Steps whose estimated local error stays below `tolerance`.
 
-    The error is the difference to the linear extrapolation, scaled to backward Euler's; root mean square per field,
-    relative to the largest change that the field has undergone so far (or a small fraction of its natural size).
+    The error is that of the embedded solution; for backward Euler, the difference to the linear extrapolation, scaled. Root
+    mean square per field, relative to the largest change that the field has undergone so far (or a small fraction of its
+    natural size).
     """
 
     tolerance: float = 1e-3
     largest: float = inf  # [s]
+    scheme: Scheme = ESDIRK4
 
     def __post_init__(self) -> None:
         _positive("Adaptive tolerance", self.tolerance, "")
         _positive("Adaptive largest", self.largest, "s")
 
+    @property
+    def newton(self) -> Newton:
+        """Nonlinear solves that add a small part of the tolerance, with few new matrices."""
+        if self.scheme.embedded is None:
+            return Newton()
+        return Newton(tolerance=NEWTON_SHARE * self.tolerance, slowest=SLOWEST)
+
     def first(self, interval: float, last: float | None) -> float:
-        start = interval / 100
+        share = 1 / 100 if self.scheme.embedded is None else FIRST * self.tolerance ** (1 / self.scheme.order)
+        start = share * interval
         return min(self.largest, start if last is None else min(last, 4 * start))
 
     def next(self, dt: float, error: float) -> float:
-        factor = 0.9 * np.sqrt(self.tolerance / error) if error > 0 else inf
-        return float(min(self.largest, dt * np.clip(factor, 0.2, 3.0)))
+        if self.scheme.embedded is None:
+            factor = 0.9 * np.sqrt(self.tolerance / error) if error > 0 else inf
+            return float(min(self.largest, dt * np.clip(factor, 0.2, 3.0)))
+        factor = 0.85 * (self.tolerance / error) ** (1 / self.scheme.order) if error > 0 else inf
+        if 1 <= factor < 1.2:
+            factor = 1.0  # keeps the matrix
+        return float(min(self.largest, dt * np.clip(factor, 0.1, 3.0)))
 
     def accepts(self, error: float) -> bool:
         return error <= self.tolerance
@@ -90,6 +117,15 @@ def _positive(name: str, value: float, unit: str) -> None:
     if not value > 0:
         raise InputError(f"{name} has to be positive, got {value!r} {unit}".rstrip())
 
+
+NEWTON_SHARE = 1e-2
+"""What the nonlinear solves may leave of a time error."""
+
+SLOWEST = 0.3
+"""Contraction of the Newton iteration from which on a new matrix is cheaper than more iterations with the old one."""
+
+FIRST = 0.1
+"""Measured start after a kink: this share of the interval to the next for a tolerance of one, less by the scheme's order."""
 
 JUMP = 0.8
 """After a kink, a change that a five times smaller step leaves above this share does not come from the time
@@ -101,24 +137,39 @@ SMALLEST_STEP = 1e-10
 
 @dataclass
 class _History:
-    """Largest change of each field so far, and the state and step before the present one unless a kink lies between."""
+    """Largest change of each field so far, and times and states of the last step unless a kink lies between."""
 
     changes: dict[str, float]
-    previous: NDArray | None = None
-    dt: float = 0.0
+    points: list[tuple[float, NDArray]]
 
     def forget(self) -> None:
-        self.previous, self.dt = None, 0.0
+        self.points = []
 
 
-class BackwardEuler:
+class Stepper:
     """Time integration of one run: call `advance` until the end; it lands on every time of `stops`."""
 
     def __init__(self, problem: Problem, control: Control, newton: Newton) -> None:
         self.problem, self.control, self.newton = problem, control, newton
+        self.scheme = control.scheme
         self.solver = LinearSolver(problem.free)
-        self.history = _History({name: self._change(name) for name in problem.model.evolving})
+        self.history = _History({name: self._change(name) for name in problem.model.evolving}, [])
         self.wanted: float | None = None
+        self._matrix_dt = 0.0
+        self._work = [problem.fields.vec.CreateVector() for _ in range(2)]
+        self._balances = np.zeros(problem.vector.size, dtype=bool)
+        for name in problem.model.held.values():
+            self._balances[problem.ranges[name]] = True
+        self._slope = self._outflow()
+
+    def _outflow(self) -> NDArray:
+        """R of the balances of contents, at the present fields and time."""
+        self.problem.outflow(self._work[0])
+        return np.where(self._balances, self._work[0].FV().NumPy(), 0.0)
+
+    def _contents(self) -> NDArray:
+        self.problem.contents(self._work[0])
+        return self._work[0].FV().NumPy().copy()
 
     def advance(self, time: float, kinks: list[float], stops: list[float]) -> StepReport:
         """One accepted step from `time`. Raises StepError, with the fields restored, when none succeeds.
@@ -139,16 +190,10 @@ class BackwardEuler:
         while True:
             dt = _landing(self.wanted, to_stop)
             end = stop if dt == to_stop else time + dt
-            guess = None if history.previous is None else old + dt / history.dt * (old - history.previous)
-            problem.begin_step(end, dt, guess)
-            outcome = self.newton.solve(problem, self.solver)
-            if outcome.reason and guess is not None:  # the extrapolation may be what is inadmissible
-                problem.vector[:] = old
-                problem.begin_step(end, dt)
-                outcome = self.newton.solve(problem, self.solver)
+            step = self._runge_kutta if self.scheme.embedded else self._backward_euler
+            outcome, error = step(time, end, old)
             if outcome.reason is None:
-                error = self._error(old, guess, dt)
-                jumps = guess is None and error > JUMP * last_error
+                jumps = not self.scheme.embedded and not history.points and error > JUMP * last_error
                 if self.control.accepts(error) or jumps:
                     break
                 last_error = error
@@ -163,13 +208,80 @@ class BackwardEuler:
             if self.wanted < SMALLEST_STEP * to_kink:
                 remedy = "Remedies: a gentler ramp, a finer mesh where the field is worst, a weaker penalty."
                 raise StepError(time, dt, field, where, reason, remedy)
-        history.previous, history.dt = old, dt
+        history.points = [(at, values) for _, at, values in self.problem.stages]
+        if not self.scheme.explicit_start:
+            history.points.insert(0, (time, old))
+        else:
+            self._slope = self._last_slope
         for name in problem.model.evolving:
             history.changes[name] = max(self._change(name), self._change_so_far(name))
         landed_short = dt < 0.999 * self.wanted
         proposed = self.control.next(dt, error)
         self.wanted = max(self.wanted, proposed) if landed_short else proposed
         return StepReport(end, dt, outcome.iterations, tuple(rejected), error)
+
+    def _solve(self, dt: float) -> Outcome:
+        """The nonlinear system of a stage whose step of backward Euler is `dt`."""
+        change = abs(1 - dt / self._matrix_dt) if self._matrix_dt else inf
+        if change > SLOWEST:
+            self.solver.ready = False
+        elif self.solver.contraction is not None:
+            self.solver.contraction = max(self.solver.contraction, change)
+        before = self.solver.factorisations
+        outcome = self.newton.solve(self.problem, self.solver)
+        if self.solver.factorisations > before:
+            self._matrix_dt = dt
+        return outcome
+
+    def _backward_euler(self, time: float, end: float, old: NDArray) -> tuple[Outcome, float]:
+        """One step and its error, by extrapolation from the step before: see `_error`."""
+        problem, dt = self.problem, end - time
+        guess = _extrapolated(self.history.points[-2:], end) if self.history.points else None
+        problem.begin_step(end, dt, guess)
+        outcome = self._solve(dt)
+        if outcome.reason and guess is not None:  # the extrapolation may be what is inadmissible
+            problem.vector[:] = old
+            problem.begin_step(end, dt)
+            outcome = self._solve(dt)
+        problem.stages = [(dt, end, problem.vector.copy())]
+        return outcome, self._error(old, guess, dt) if outcome.reason is None else inf
+
+    def _runge_kutta(self, time: float, end: float, old: NDArray) -> tuple[Outcome, float]:
+        """The stages of one step, and its error by the embedded solution.
+
+        Stage i solves S(x_i) + γ Δt R(x_i) = S(x_old) − Δt Σ_{j<i} a_ij R_j; R_j is what that stage's contents tell.
+        The estimate, a defect of contents, becomes one of the fields by the stages' matrix, which damps what is stiff.
+        """
+        problem, scheme, dt = self.problem, self.scheme, end - time
+        inner = scheme.diagonal * dt
+        contents = self._contents()
+        slopes: list[NDArray] = [self._slope]
+        problem.stages = [(scheme.weights[0] * dt, time, old)]
+        points = [*self.history.points[:-1], (time, old)]
+        iterations = 0
+        for row, share, weight in list(zip(scheme.rows, scheme.times, scheme.weights, strict=True))[1:]:
+            at = end if share == 1.0 else time + share * dt
+            start = contents - dt * (np.array(row[:-1]) @ np.array(slopes))
+            guess = _extrapolated(sorted(points, key=lambda point: abs(point[0] - at))[:3], at)
+            problem.begin_stage(at, inner, start, guess)
+            outcome = self._solve(inner)
+            if outcome.reason:
+                problem.begin_stage(at, inner, start, old)
+                outcome = self._solve(inner)
+            iterations += outcome.iterations
+            if outcome.reason:
+                return outcome, inf
+            slopes.append((start - self._contents()) / inner)
+            points.append((at, problem.vector.copy()))
+            problem.stages.append((weight * dt, at, points[-1][1]))
+        self._last_slope = slopes[-1]
+        right, error = self._work
+        right.FV().NumPy()[:] = scheme.difference @ np.array(slopes) / scheme.diagonal
+        self.solver.solve(right, error)
+        return Outcome(iterations), self._relative(error.FV().NumPy())
+
+    def _relative(self, difference: NDArray) -> float:
+        return max(_rms(difference[self.problem.ranges[n]]) / self._change_so_far(n) for n in self.problem.model.evolving)
 
     def _error(self, old: NDArray, guess: NDArray | None, dt: float) -> float:
         """Local error of the step, relative to the largest change of each field so far.
@@ -178,12 +290,8 @@ class BackwardEuler:
         error is Δt²/2 x″. Without a step before, the guess is the old state (x′ = 0 before a kink).
         """
         predicted = old if guess is None else guess
-        share = dt / (2 * dt + (self.history.dt if guess is not None else 0.0))
-        difference = self.problem.vector - predicted
-        return max(
-            share * _rms(difference[self.problem.ranges[name]]) / self._change_so_far(name)
-            for name in self.problem.model.evolving
-        )
+        past = self.history.points[-1][0] - self.history.points[-2][0] if guess is not None else 0.0
+        return dt / (2 * dt + past) * self._relative(self.problem.vector - predicted)
 
     def _change(self, name: str) -> float:
         part = self.problem.ranges[name]
@@ -192,6 +300,13 @@ class BackwardEuler:
     def _change_so_far(self, name: str) -> float:
         floor = self.problem.model.evolving[name] * self.problem.references[name]
         return max(floor, self.history.changes[name])
+
+
+def _extrapolated(points: list[tuple[float, NDArray]], time: float) -> NDArray:
+    """The polynomial through (time, state) points, at `time`."""
+    times = np.array([at for at, _ in points])
+    weights = [np.prod([(time - other) / (at - other) for other in times if other != at]) for at in times]
+    return np.array(weights) @ np.array([values for _, values in points])
 
 
 def _rms(values: NDArray) -> float:

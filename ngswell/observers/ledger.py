@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 import numpy as np
+from ngsolve import BilinearForm
 from numpy.typing import NDArray
 
-from ngswell.baths import Weak
 from ngswell.observers.base import Observer
 from ngswell.problem import Problem
+from ngswell.quadrature import vertices_of
 from ngswell.stepping import StepReport
 
 
 class Ledger(Observer):
     """Fluid volume and cations held, and what left through each bath by the discrete fluxes.
 
-    Both are sums over the test functions that add up to one, so `held − held₀ + Σ left` closes to the accuracy of the
-    nonlinear solve: the scheme conserves exactly. A node that two strongly treated baths share counts with the first.
+    What left is what the balances of the nodes on a bath lack: their flows from the body, over the stages of the step, less
+    the fall of their contents. A node that two baths share counts with the first. `held − held₀ + Σ left` is what the
+    nonlinear solves left in all other nodes: the scheme itself conserves exactly.
 
     Attributes, one entry a time: `time` [s], `fluid` [mm², in 1-d mm, in 3-d mm³] and, where the model has
     ions, `cations` [mol/l times that];
@@ -30,24 +32,28 @@ class Ledger(Observer):
     def start(self, problem: Problem, begin: float, until: float) -> None:
         self._vector = problem.fields.vec.CreateVector()
         self._vertices = {name: slice(r.start, r.start + problem.mesh.nv) for name, r in problem.ranges.items()}
-        self._effluxes = [
-            (bath.boundary, name, problem.form(term))
-            for bath in problem.scene.baths
-            for name in problem.model.held
-            for term in problem.terms
-            if (term.balance, term.name, term.boundary) == (name, "efflux", bath.boundary)
-        ]
-        self._reactions: list[tuple[str, str, NDArray]] = []
+        self._flows = BilinearForm(problem.space)
+        for term in problem.terms:
+            if term.balance in problem.model.held and term.kind != "rate" and term.name != "efflux":
+                self._flows += problem.integral(term)
+        self._nodes: dict[tuple[str, str], NDArray] = {}
         taken = np.zeros(problem.mesh.nv, dtype=bool)
         for bath in problem.scene.baths:
-            if not isinstance(problem.scene.treatment(bath), Weak):
-                region = problem.mesh.Boundaries(bath.boundary)
-                mine = sorted({v.nr for element in region.Elements() for v in element.vertices if not taken[v.nr]})
-                taken[mine] = True
-                for name, unknown in problem.model.held.items():
-                    self._reactions.append((bath.boundary, name, problem.ranges[unknown].start + np.array(mine)))
-        self._left = {(name, bath.boundary): [0.0] for bath in problem.scene.baths for name in problem.model.held}
+            mine = np.array([number for number in sorted(vertices_of(problem.mesh, bath.boundary)) if not taken[number]])
+            taken[mine] = True
+            for name, unknown in problem.model.held.items():
+                self._nodes[name, bath.boundary] = problem.ranges[unknown].start + mine
+        self._left = {key: [0.0] for key in self._nodes}
+        self._contents = self._contents_at_nodes(problem)
         super().start(problem, begin, until)
+
+    def _contents_at_nodes(self, problem: Problem) -> dict[tuple[str, str], float]:
+        problem.contents(self._vector)
+        return self._sums()
+
+    def _sums(self) -> dict[tuple[str, str], float]:
+        values = self._vector.FV().NumPy()
+        return {key: float(values[dofs].sum()) for key, dofs in self._nodes.items()}
 
     def record(self, problem: Problem, time: float) -> None:
         problem.contents(self._vector)
@@ -56,15 +62,16 @@ class Ledger(Observer):
             self._held.setdefault(name, []).append(held[self._vertices[unknown]].sum())
 
     def observe(self, problem: Problem, report: StepReport) -> None:
-        values = self._vector.FV().NumPy()
-        gone = dict.fromkeys(self._left, 0.0)
-        for boundary, name, form in self._effluxes:
-            form.Apply(problem.fields.vec, self._vector)
-            gone[name, boundary] += report.dt * values[self._vertices[problem.model.held[name]]].sum()
-        if self._reactions:
-            problem.residual(self._vector)
-            for boundary, name, dofs in self._reactions:
-                gone[name, boundary] -= report.dt * values[dofs].sum()
+        contents = self._contents_at_nodes(problem)
+        gone = {key: self._contents[key] - now for key, now in contents.items()}
+        self._contents = contents
+        state = problem.vector.copy()
+        for weight, _, values in problem.stages:
+            problem.vector[:] = values
+            self._flows.Apply(problem.fields.vec, self._vector)
+            for key, flow in self._sums().items():
+                gone[key] -= weight * flow
+        problem.vector[:] = state
         for key, amount in gone.items():
             self._left[key].append(self._left[key][-1] + amount)
         super().observe(problem, report)

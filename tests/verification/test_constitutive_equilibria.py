@@ -20,6 +20,7 @@ from ngswell import (
     LocalDonnan,
     MackieMeares,
     Material,
+    Newton,
     Penalty,
     Pin,
     PlaneStrain,
@@ -54,7 +55,7 @@ def test_column_comes_to_the_closed_form(model, choice):
     probe = Probe((0.2,), "J", "p", "cfc", "c_plus", "c_minus", "hydraulic_pressure")
     baths = [Bath("top", c=Ramp((0, 1.0), (100, 0.3)), P=0.05)]
     scene = confined_column(material=material, model=model, baths=baths, cells=6, loads=[Traction("top", (-0.1,))])
-    scene.run(1e6, Adaptive(2e-2), [probe])
+    scene.run(1e6, Adaptive(2e-2), [probe], newton=Newton())
     state = homogeneous_equilibrium(material, 0.3, "confined", hydraulic=0.05, load=0.1)
     osmotic = material.RT * material.phi_bath * 2 * 0.3
     wanted = {"J": state.J, "p": state.p, "cfc": state.cfc, "c_plus": state.c, "c_minus": state.c - state.cfc}
@@ -79,7 +80,7 @@ def test_free_block_comes_to_the_closed_form(model):
         charge=Ramp((0, 0.0), (100, 1.0)),
     )
     area = Area()
-    scene.run(1e6, Adaptive(2e-2), [area])
+    scene.run(1e6, Adaptive(2e-2), [area], newton=Newton())
     assert area.values[-1] / 0.8 == pytest.approx(homogeneous_equilibrium(material, 0.3, "plane strain").J, rel=1e-8)
 
 
@@ -101,7 +102,7 @@ def at_rest(n, choice, model):
         charge=Ramp((0, 0.0), (100, 1.0)),
         initial=(1.0, 0.0),
     )
-    scene.run(1e7, Adaptive(5e-2))
+    scene.run(1e7, Adaptive(5e-2), newton=Newton())
     return scene
 
 
@@ -152,7 +153,7 @@ def test_all_models_reach_the_same_equilibrium():
         probe = Probe((1.0,), "displacement")
         baths, charged = [Bath("top", c=0.3)], replace(material, cfc0=0.4 + 0.4 * x)
         scene = confined_column(mesh=column(1.0, cells), material=charged, model=model, baths=baths, loads=[])
-        scene.run(1e7, Adaptive(5e-2), [probe])
+        scene.run(1e7, Adaptive(5e-2), [probe], newton=Newton())
         return abs(probe.values["displacement"][-1] - exact)
 
     # Linear p, c, cfc: order 2. The others have the charge at the point, and the end of a 1-d column superconverges.
@@ -188,7 +189,7 @@ def test_steady_seepage_through_a_column_of_varying_permeability(law):
             loads=[],
             initial=(None, 0.0),
         )
-        scene.run(1e6, Adaptive(5e-2), [ledger])
+        scene.run(1e6, Adaptive(5e-2), [ledger], newton=Newton())
         return np.diff(ledger.fluid_left["top"])[-1] / np.diff(ledger.time)[-1]
 
     coarse, fine = (abs(seepage(cells) / exact - 1) for cells in (10, 20))
@@ -208,7 +209,7 @@ def test_steady_diffusion_through_a_compressed_column():
         loads=[Traction("top", (-0.1,))],
         initial=(0.2, 0.0),
     )
-    scene.run(1e7, Adaptive(5e-2), [probe])
+    scene.run(1e7, Adaptive(5e-2), [probe], newton=Newton())
     J = homogeneous_equilibrium(material, 0.2, "confined", load=0.1).J
     nF = 1 - 0.25 / J
     D = 2 * 5e-4 * 8e-4 / (5e-4 + 8e-4) * (nF / (2 - nF)) ** 2

@@ -16,6 +16,7 @@ from ngswell import (
     Essential,
     Ledger,
     Multiplier,
+    Newton,
     Nitsche,
     Penalty,
     PlaneStrain,
@@ -47,7 +48,7 @@ def test_column(choice, end, until_diluted):
     c = Ramp((0, 0.15), (until_diluted, end)) if until_diluted else end
     scene = confined_column(treatment, c=c, model=model, cells=10, initial=(0.15, 0.0))
     probe, ledger = Probe((0.1,), "J", "p", "c_plus", "cfc"), Ledger()
-    result = scene.run(1e6, Adaptive(1e-2), [probe, ledger])
+    result = scene.run(1e6, Adaptive(1e-2), [probe, ledger], newton=Newton())
     rest = homogeneous_equilibrium(TABLE_1, end, "confined", load=P0)
     # A homogeneous state lies in every space. What is left of the penalty at the last steps of 1e5 s is round-off, 1e-10.
     for name, value in (("J", rest.J), ("p", rest.p), ("c_plus", rest.c), ("cfc", rest.cfc)):
@@ -74,7 +75,7 @@ def diluted_area(choice, end, duration, until):
     model, treatment = CHOICES[choice]
     swollen = Snapshot(0.0, block(model, treatment, 1.0).equilibrate().values)
     scene, area = block(model, treatment, Ramp((0, 1.0), (duration, end)) if duration else end), Area()
-    scene.run(until, Adaptive(1e-2), [area], resume=swollen)
+    scene.run(until, Adaptive(1e-2), [area], resume=swollen, newton=Newton())
     return area.values
 
 

@@ -16,6 +16,7 @@ from ngswell import (
     Frozen,
     Lagged,
     Ledger,
+    Newton,
     Penalty,
     Pin,
     PlaneStrain,
@@ -71,7 +72,7 @@ def test_free_block_comes_to_the_closed_form(treatment, order):
         charge=Ramp((0, 0.0), (100, 1.0)),
     )
     area, probe = Area(), Probe((0.5, 0.4), "J", "p", "cfc", "c_plus", "nS")
-    scene.run(1e6, Adaptive(1e-2), [area, probe])
+    scene.run(1e6, Adaptive(1e-2), [area, probe], newton=Newton())
     state = homogeneous_equilibrium(TABLE_2, 0.3, "plane strain")
     # A homogeneous state lies in every space: what is left is the relaxation still to come.
     assert area.values[-1] / 0.8 == pytest.approx(state.J, rel=1e-8)
@@ -123,7 +124,7 @@ def test_weight_of_the_fluid_is_hydrostatic():
     )
     ledger = Ledger()
     low, high = (Probe((z,), "hydraulic_pressure", "displacement", "c_plus", "c_minus", "stress") for z in (0.0, 20.0))
-    scene.run(2e7, Adaptive(5e-2), [ledger, low, high])
+    scene.run(2e7, Adaptive(5e-2), [ledger, low, high], newton=Newton())
     length = 20.0 + high.values["displacement"][-1] - low.values["displacement"][-1]
     fall = low.values["hydraulic_pressure"][-1] - high.values["hydraulic_pressure"][-1]
     assert fall == pytest.approx(gamma_F * length, rel=2e-5)  # h² of linear p on 40 cells

@@ -194,7 +194,7 @@ def equilibrium(model, bath, kinematics):
         **shape, material=TABLE_2, model=model, baths=[Bath("top", c=c, P=0.01, treatment=WEAK)],
         charge=Ramp((0, 0.0), (100, 1.0)),
     )  # fmt: skip
-    scene.run(1e6, Adaptive(1e-2), [probe])
+    scene.run(1e6, Adaptive(1e-2), [probe], newton=Newton())
     return {name: float(probe.values[name][-1].item()) for name in names}
 
 
