@@ -40,6 +40,11 @@ class Scheme:
         return self.rows[-1][-1]
 
     @property
+    def power(self) -> int:
+        """Power of the step that the estimated error of a step goes with."""
+        return max(self.order, 2)
+
+    @property
     def explicit_start(self) -> bool:
         return self.rows[0] == (0.0,)
 
@@ -51,7 +56,7 @@ class Scheme:
 
 
 BACKWARD_EULER = Scheme("backward Euler", 1, ((1.0,),))
-"""The paper's."""
+"""The paper's. Contents that have to stay positive do, which stages that weigh rates negatively do not promise."""
 
 ESDIRK4 = Scheme(
     "ESDIRK4(3)",

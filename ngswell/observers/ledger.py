@@ -7,7 +7,7 @@ from ngsolve import BilinearForm
 from numpy.typing import NDArray
 
 from ngswell.observers.base import Observer
-from ngswell.problem import Problem
+from ngswell.problem import Problem, Snapshot
 from ngswell.quadrature import vertices_of
 from ngswell.stepping import StepReport
 
@@ -65,13 +65,13 @@ class Ledger(Observer):
         contents = self._contents_at_nodes(problem)
         gone = {key: self._contents[key] - now for key, now in contents.items()}
         self._contents = contents
-        state = problem.vector.copy()
-        for weight, _, values in problem.stages:
-            problem.vector[:] = values
+        end = problem.snapshot(report.time)
+        for weight, time, values in problem.stages:
+            problem.restore(Snapshot(time, values))
             self._flows.Apply(problem.fields.vec, self._vector)
             for key, flow in self._sums().items():
                 gone[key] -= weight * flow
-        problem.vector[:] = state
+        problem.restore(end)
         for key, amount in gone.items():
             self._left[key].append(self._left[key][-1] + amount)
         super().observe(problem, report)

@@ -263,7 +263,7 @@ def swell(mesh, kinematics, supports, boundary, observers=()):
     )
     point = {1: (0.7,), 2: (0.4, 0.3), 3: (0.4, 0.3, 0.2)}[mesh.dim]
     volume, probe, ledger = Area(), Probe(point, "J", "p", "cfc", "c_plus", "nS"), Ledger()
-    scene.run(1e6, Adaptive(1e-2), [volume, probe, ledger, *observers], newton=Newton())
+    scene.run(1e6, Adaptive(1e-4), [volume, probe, ledger, *observers], newton=Newton())
     return scene, volume.values, probe.values, ledger
 
 

@@ -75,7 +75,7 @@ def diluted_area(choice, end, duration, until):
     model, treatment = CHOICES[choice]
     swollen = Snapshot(0.0, block(model, treatment, 1.0).equilibrate().values)
     scene, area = block(model, treatment, Ramp((0, 1.0), (duration, end)) if duration else end), Area()
-    scene.run(until, Adaptive(1e-2), [area], resume=swollen, newton=Newton())
+    scene.run(until, Adaptive(1e-4), [area], resume=swollen, newton=Newton())
     return area.values
 
 

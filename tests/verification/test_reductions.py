@@ -224,7 +224,7 @@ def test_ledger_of_the_reduced_models_closes(model, motion, treatment):
     else:
         scene = replace(scene, baths=[bath])
     ledger = Ledger()
-    scene.run(200.0, Adaptive(1e-2), [ledger])
+    scene.run(200.0, Adaptive(1e-2), [ledger], newton=Newton())
     assert np.abs(ledger.fluid - ledger.fluid[0]).max() > 0.01 * ledger.fluid[0]  # something flows
     assert ledger.imbalance().keys() == {"fluid"}
     # Newton's remainder of 1e-8 per field, with one more correction applied than tested.
