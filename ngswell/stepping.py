@@ -40,7 +40,7 @@ class Control(Protocol):
         """First step after a kink, when the next kink is `interval` away and `last` was the step before, if any."""
         ...
 
-    def next(self, dt: float, error: float, power: int) -> float:
+    def next(self, dt: float, error: float, power: float) -> float:
         """Next step after one of size `dt` with the estimated `error`, which goes with this `power` of the step."""
         ...
 
@@ -64,7 +64,7 @@ class Fixed:
     def first(self, interval: float, last: float | None) -> float:
         return self.step
 
-    def next(self, dt: float, error: float, power: int) -> float:
+    def next(self, dt: float, error: float, power: float) -> float:
         return self.step
 
     def accepts(self, error: float) -> bool:
@@ -100,8 +100,9 @@ class Adaptive:
         start = share * interval
         return min(self.largest, start if last is None else min(last, 4 * start))
 
-    def next(self, dt: float, error: float, power: int) -> float:
-        factor = 0.9 * (self.tolerance / error) ** (1 / power) if error > 0 else inf
+    def next(self, dt: float, error: float, power: float) -> float:
+        safety = 0.8 if self.scheme.embedded else 0.9
+        factor = safety * (self.tolerance / error) ** (1 / power) if error > 0 else inf
         if 1 <= factor < 1.2 and self.scheme.embedded:
             factor = 1.0  # keeps the matrix
         return float(min(self.largest, dt * np.clip(factor, 0.2, 3.0)))
@@ -115,7 +116,7 @@ def _positive(name: str, value: float, unit: str) -> None:
         raise InputError(f"{name} has to be positive, got {value!r} {unit}".rstrip())
 
 
-NEWTON_SHARE = 1e-2
+NEWTON_SHARE = 3e-3
 """What the nonlinear solves may leave of a time error."""
 
 SLOWEST = 0.3
@@ -128,10 +129,9 @@ JUMP = 0.8
 """After a kink, a change that a five times smaller step leaves above this share does not come from the time
 discretisation: pressure and displacement follow a sudden load at once."""
 
-MANY, CAREFUL = 4, 10
-"""A step that stages of higher order do not find in two attempts, or not accurately in so many, is taken with backward
-Euler, as are so many after it: where rates jump, that at the start tells nothing, and vanishing contents need positive
-weights."""
+STUCK, CAREFUL = 0.25, 10
+"""A step whose stages of higher order are not found in two attempts, or whose error falls with no more than this power of
+the step, is taken with backward Euler, as are so many after it: where contents vanish or rates jump."""
 
 SMALLEST_STEP = 1e-12
 """Steps below this fraction of the interval between two kinks count as none."""
@@ -189,7 +189,7 @@ class Stepper:
             self.wanted = self.control.first(to_kink, self.wanted)
         old = problem.vector.copy()
         rejected: list[str] = []
-        last_error = inf
+        last: tuple[float, float] | None = None  # step and error of the attempt before
         scheme = BACKWARD_EULER if self._careful else self.scheme
         while True:
             dt = _landing(self.wanted, to_stop)
@@ -199,20 +199,23 @@ class Stepper:
             else:
                 outcome, error = self._backward_euler(time, end, old)
             if outcome.reason is None:
-                jumps = not scheme.embedded and not history.points and error > JUMP * last_error
+                jumps = not scheme.embedded and not history.points and last is not None and error > JUMP * last[1]
                 if self.control.accepts(error) or jumps:
                     break
-                last_error = error if scheme is BACKWARD_EULER else inf
                 reason, (field, where) = f"error {error:.2g}", problem.worst(problem.vector - old)
-                self.wanted = self.control.next(dt, error, scheme.power)
+                power = scheme.power if last is None else np.log(last[1] / error) / np.log(last[0] / dt)
+                stuck = power < STUCK
+                last = dt, error
+                self.wanted = self.control.next(dt, error, np.clip(power, 1, scheme.power))
             else:
                 reason, field, where = outcome.reason, outcome.field, outcome.where
+                stuck = bool(rejected)
                 self.wanted = dt / 4
             rejected.append(f"dt = {dt:.3g} s: {reason}")
             if len(rejected) == 1:
                 tried = dt
-            elif scheme.embedded and (outcome.reason or len(rejected) == MANY):
-                scheme, self.wanted, self._careful = BACKWARD_EULER, tried, CAREFUL
+            elif scheme.embedded and stuck:
+                scheme, last, self.wanted, self._careful = BACKWARD_EULER, None, tried, CAREFUL
             problem.vector[:] = old
             problem.set_time(time)
             if self.wanted < SMALLEST_STEP * to_kink:

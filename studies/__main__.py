@@ -13,7 +13,7 @@ from ngswell.plotting import use_style
 from studies.output import prepare, write
 
 PAPER = ("boundary_charge", "oscillation", "free_swelling")
-STUDIES = (*PAPER, "convergence", "cylinder", "reductions", "stability", "treatments", "verification")
+STUDIES = (*PAPER, "convergence", "cylinder", "reductions", "speed_error", "stability", "treatments", "verification")
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -24,12 +24,17 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--out", type=Path, help="folder to write to; figures/ by default, figures/quick/ with --quick")
     parser.add_argument("--overwrite", action="store_true", help="replace files in the folder named with --out")
     parser.add_argument("--from-rest", action="store_true", help="free_swelling: skip the ramp of the charge")
+    parser.add_argument("--plain", type=Path, help="speed_error: the plain NGSolve script to compare with")
     options = parser.parse_args(arguments)
     if options.from_rest and options.name != "free_swelling":
         parser.error("--from-rest goes with free_swelling")
+    if options.plain and options.name != "speed_error":
+        parser.error("--plain goes with speed_error")
+    if options.plain and not options.plain.is_file():
+        parser.error(f"--plain: there is no file {options.plain}")
 
     names = PAPER if options.name is None else (options.name,)
-    special = {"from_rest": True} if options.from_rest else {}
+    special = {"from_rest": True} if options.from_rest else {"plain": options.plain} if options.plain else {}
     own = Path("figures/quick") if options.quick else Path("figures")
     folder = own if options.out is None else options.out
     try:

@@ -1,0 +1,314 @@
+"""Error against time: the free-swelling block by a plain NGSolve script, by the paper's way, and by our choices.
+
+Errors are against a reference, whose own error is estimated by a second one with another order, mesh and tolerance. Area:
+largest error over all steps from 0 to 11000 s, relative to the area at 7000 s. Pressure: root mean square over the block at
+the worst of the pictured times, relative to that of the pressure. Seconds are those of the time loop, medians of runs that
+take turns. For each curve NAME of the figure:
+
+- `NAME_seconds_at_1e-2`, `..._1e-3`, `..._1e-4` [s] for that error of the area, on the line through the points that no
+  other point of the curve beats in both error and time; `NAME_at_1e-2` and so on: "measured" (between points),
+  "extrapolated" (beyond the most accurate, along the last two), "at most" (the cheapest point is already more accurate);
+- `NAME_setup_seconds` [s]: mesh, spaces, forms and their compilation, for the dearest point of the curve;
+- `ratio_to_plain_at_1e-2`, `..._1e-3`: seconds of the plain script over those of the best of our curves, `best_at_...`;
+- `reference_area_error`, `reference_pressure_error`: what the two references differ by;
+- `penalty_40_area_error`: what the paper's penalty itself changes, on one mesh with one tolerance.
+
+The plain script is no part of the project: `--plain PATH` names it, or it lies in ../shared/peers beside the checkout; else
+`plain` says that it is absent, and the ratios are left out.
+"""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+from pathlib import Path
+from time import perf_counter
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from ngswell import (
+    BACKWARD_EULER,
+    Adaptive,
+    Area,
+    Concentration,
+    Penalty,
+    Potential,
+    Progress,
+    Result,
+    Scene,
+    Snapshots,
+    rectangle,
+)
+from ngswell.models import Model
+from studies import free_swelling
+from studies.free_swelling import END, HEIGHT, INITIAL, WIDTH
+from studies.output import Findings, cost
+
+PICTURES = free_swelling.PICTURES[1:]
+SCRIPT = Path(__file__).resolve().parents[2] / "shared" / "peers" / "plain_ngsolve.py"
+WANTED = (1e-2, 1e-3, 1e-4)
+SAMPLES = np.stack(
+    np.meshgrid(WIDTH * (np.arange(24) + 0.497) / 24, HEIGHT * (np.arange(24) + 0.497) / 24), axis=-1
+).reshape(-1, 2)
+"""Where pressures are compared [mm]; off the lines of all meshes used."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """One way to compute the scene."""
+
+    model: Model
+    cells: int
+    grade: float  # largest over smallest cell, toward the baths
+    steps: Adaptive
+    penalty: float | None = None  # the paper's ε; None: the model's default
+
+    def scene(self) -> Scene:
+        paper = free_swelling.scene(1, 1)
+        treatment = None if self.penalty is None else Penalty(self.penalty)
+        return replace(
+            paper,
+            mesh=rectangle(
+                WIDTH, HEIGHT, self.cells, self.cells, grade=dict.fromkeys(("top", "left", "bottom"), self.grade)
+            ),
+            model=self.model,
+            baths=[replace(bath, treatment=treatment) for bath in paper.baths],
+        )
+
+
+@dataclass
+class Course:
+    """A run's area over time, its pressures at the pictured times, and what it cost."""
+
+    time: NDArray
+    area: NDArray
+    pressures: NDArray | None
+    unknowns: int
+    seconds: list[float]
+    setup: float = 0.0
+    result: Result | None = None
+
+
+def compute(run: Run, label: str) -> Course:
+    clock = perf_counter()
+    scene = run.scene()
+    problem = scene.problem
+    setup = perf_counter() - clock
+    area, pictures = Area(), Snapshots(PICTURES)
+    result = scene.run(END, run.steps, [area, pictures, Progress(f"speed_error {label}")])
+    pressures = []
+    for state in pictures.states:
+        problem.restore(state)
+        pressures.append(problem.state.outputs()["p"](problem.mesh(*SAMPLES.T)).ravel())
+    return Course(area.time, area.values, np.array(pressures), problem.space.ndof, [result.seconds], setup, result)
+
+
+def compute_plain(script: Path, cells: tuple[int, int], step: float) -> Course:
+    """The plain script in a process of its own."""
+    with tempfile.TemporaryDirectory() as folder:
+        output = Path(folder) / "plain.json"
+        command = [sys.executable, str(script), "--nx", str(cells[0]), "--ny", str(cells[1]), "--dt", str(step)]
+        subprocess.run([*command, "--json", str(output)], check=True, capture_output=True)
+        found = json.loads(output.read_text(encoding="utf-8"))
+    history = np.array(found["history"])
+    return Course(history[:, 0], history[:, 1], None, found["ndof"], [found["seconds"]])
+
+
+@dataclass
+class Reference:
+    """What is taken as exact: area over time between the kinks of the baths, and pressures."""
+
+    course: Course
+    kinks: Sequence[float] = (0.0, 4000.0, 7000.0, 7080.0, 7220.0, 8000.0, 10000.0, END)
+
+    def area(self, time: NDArray) -> NDArray:
+        """Cubic through the four nearest steps, none beyond a kink."""
+        values = np.empty_like(time)
+        for number, at in enumerate(time):
+            after = next(kink for kink in self.kinks[1:] if at <= kink + 1e-6)
+            before = max(kink for kink in self.kinks if kink < after)
+            inside = np.flatnonzero((self.course.time >= before - 1e-6) & (self.course.time <= after + 1e-6))
+            near = inside[np.argsort(np.abs(self.course.time[inside] - at))[:4]]
+            times = self.course.time[near]
+            weights = [np.prod([(at - other) / (own - other) for other in times if other != own]) for own in times]
+            values[number] = np.array(weights) @ self.course.area[near]
+        return values
+
+    def area_error(self, course: Course) -> float:
+        initial = self.area(np.array([INITIAL]))[0]
+        return float(np.abs(course.area - self.area(course.time)).max() / initial)
+
+    def pressure_error(self, course: Course) -> float:
+        assert course.pressures is not None
+        assert self.course.pressures is not None
+        size = np.sqrt((self.course.pressures**2).mean(axis=1))
+        return float((np.sqrt(((course.pressures - self.course.pressures) ** 2).mean(axis=1)) / size).max())
+
+
+@dataclass
+class Curve:
+    """Ways to compute the scene that differ in mesh and accuracy."""
+
+    name: str
+    label: str
+    marker: str
+    makers: Sequence[Callable[[], Course]]
+    settings: Sequence[tuple[str, float]]
+    courses: list[Course] = field(default_factory=list)
+
+    def take_turn(self) -> None:
+        """Run every point once; the second time only the seconds are new."""
+        again = [make() for make in self.makers]
+        for course, other in zip(self.courses, again, strict=False):
+            course.seconds += other.seconds
+        self.courses = self.courses or again
+
+    @property
+    def seconds(self) -> list[float]:
+        return [float(np.median(course.seconds)) for course in self.courses]
+
+
+def seconds_at(wanted: float, errors: Sequence[float], seconds: Sequence[float]) -> tuple[float, str]:
+    """Time for an error, on the line (both logarithmic) through the points that no other beats, and how it was found."""
+    best: list[tuple[float, float]] = []
+    for pair in sorted(zip(seconds, errors, strict=True)):
+        if not best or pair[1] < best[-1][1]:
+            best.append(pair)
+    log_time, log_error = np.log(best).T
+    target = np.log(wanted)
+    if target >= log_error[0]:
+        return best[0][0], "at most"
+    inside = target >= log_error[-1]
+    number = int(np.searchsorted(-log_error, -target)) if inside else len(best) - 1
+    rise = log_time[number] - log_time[number - 1]
+    slope = rise / (log_error[number] - log_error[number - 1]) if number else -1.0
+    return float(np.exp(log_time[number] + slope * (target - log_error[number]))), "measured" if inside else "extrapolated"
+
+
+def our_curves(quick: bool) -> list[Curve]:
+    """Per model, mesh family and order: meshes and tolerances that belong together."""
+
+    def curve(
+        name: str, marker: str, model: Model, grade: float, points: Sequence[tuple[int, float]], **ways: float
+    ) -> Curve:
+        label = name.lower().replace(" ", "_").replace(",", "")
+        runs = [Run(model, cells, grade, Adaptive(tolerance)) for cells, tolerance in points]
+        makers = [partial(compute, run, f"{name} {run.cells}") for run in runs]
+        return Curve(label, name, marker, makers, [(f"{run.cells} x {run.cells}", run.steps.tolerance) for run in runs])
+
+    second = [(4, 1e-1), (6, 3e-2)] if quick else [(6, 3e-2), (8, 1e-2), (12, 3e-3), (16, 1e-3), (24, 3e-4), (36, 1e-4)]
+    third = [(3, 1e-1), (5, 3e-2)] if quick else [(3, 1e-1), (4, 3e-2), (6, 3e-3), (8, 1e-3), (12, 1e-4), (16, 3e-5)]
+    fourth = [(2, 1e-1), (4, 3e-2)] if quick else [(3, 1e-1), (4, 1e-2), (5, 3e-3), (6, 1e-3), (8, 1e-4), (10, 3e-5)]
+    uniform = [(4, 1e-1), (6, 3e-2)] if quick else [(6, 3e-2), (11, 1e-2), (22, 1e-3), (44, 1e-3)]
+    return [
+        curve("Potential order 2 uniform", "s", Potential(2), 1.0, uniform),
+        curve("Potential order 2 graded", "o", Potential(2), 6.0, second),
+        curve("Potential order 3 graded", "^", Potential(3), 6.0, third),
+        curve("Potential order 4 graded", "D", Potential(4), 6.0, fourth),
+        curve("Concentration order 2 graded", "v", Concentration(2), 6.0, second),
+        curve("Concentration order 3 graded", "<", Concentration(3), 6.0, third),
+    ]
+
+
+def paper_curve(quick: bool) -> Curve:
+    """The paper's way: concentrations, its penalty, uniform cells, backward Euler (with our control of the error)."""
+    points = [(4, 1e-2)] if quick else [(11, 1e-2), (22, 1e-3), (33, 3e-4)]
+    runs = [
+        Run(Concentration(), cells, 1.0, Adaptive(tolerance, scheme=BACKWARD_EULER), 40.0) for cells, tolerance in points
+    ]
+    makers = [partial(compute, run, f"paper's way {run.cells}") for run in runs]
+    settings = [(f"{run.cells} x {run.cells}", run.steps.tolerance) for run in runs]
+    return Curve("paper", "as in the paper, backward Euler", "x", makers, settings)
+
+
+def plain_curve(script: Path, quick: bool) -> Curve:
+    points = [((4, 4), 200.0)] if quick else [((11, 10), 40.0), ((22, 20), 20.0), ((33, 30), 10.0)]
+    makers = [partial(compute_plain, script, cells, step) for cells, step in points]
+    settings = [(f"{nx} x {ny}", step) for (nx, ny), step in points]
+    return Curve("plain", "plain NGSolve script", "+", makers, settings)
+
+
+def run(quick: bool = False, plain: Path | None = None) -> Findings:
+    """All curves, their points three times in turns, and what they say."""
+    script = SCRIPT if plain is None else plain
+    best = Run(Potential(3), 8, 6.0, Adaptive(1e-4)) if quick else Run(Potential(4), 16, 6.0, Adaptive(1e-6))
+    other = Run(Potential(3), 6, 6.0, Adaptive(3e-4)) if quick else Run(Potential(3), 24, 8.0, Adaptive(3e-6))
+    reference = Reference(compute(best, "reference"))
+    check = compute(other, "second reference")
+    numbers: dict[str, float | int | str] = {
+        "reference_area_error": reference.area_error(check),
+        "reference_pressure_error": reference.pressure_error(check),
+    }
+    exact, weak = (
+        compute(Run(Concentration(3), 4 if quick else 12, 6.0, Adaptive(1e-3 if quick else 1e-5), penalty), "penalty")
+        for penalty in (None, 40.0)
+    )
+    numbers["penalty_40_area_error"] = Reference(exact).area_error(weak)
+
+    curves = [*our_curves(quick), paper_curve(quick)]
+    if script.is_file():
+        curves.insert(0, plain_curve(script, quick))
+    numbers["plain"] = "run" if script.is_file() else f"absent: no {script.name}; name it with --plain"
+    for _ in range(1 if quick else 3):
+        for curve in curves:
+            curve.take_turn()
+
+    rows: list[tuple[object, ...]] = []
+    at: dict[str, dict[float, float]] = {}
+    for curve in curves:
+        errors = [reference.area_error(course) for course in curve.courses]
+        at[curve.name] = {}
+        for wanted in WANTED:
+            at[curve.name][wanted], how = seconds_at(wanted, errors, curve.seconds)
+            numbers |= {
+                f"{curve.name}_seconds_at_{_power(wanted)}": at[curve.name][wanted],
+                f"{curve.name}_at_{_power(wanted)}": how,
+            }
+        numbers[f"{curve.name}_setup_seconds"] = max(course.setup for course in curve.courses)
+        for (mesh, accuracy), course, error, seconds in zip(
+            curve.settings, curve.courses, errors, curve.seconds, strict=True
+        ):
+            pressure = "" if course.pressures is None else reference.pressure_error(course)
+            done = course.result
+            effort = (len(done.steps), done.iterations, done.factorisations, done.solves) if done else ("", "", "", "")
+            spread = (min(course.seconds), max(course.seconds))
+            rows.append(
+                (curve.name, mesh, accuracy, course.unknowns, seconds, *spread, course.setup, error, pressure, *effort)
+            )
+    ours = [curve.name for curve in curves if curve.name not in ("plain", "paper")]
+    for wanted in WANTED[:2] if "plain" in at else ():
+        fastest = min(ours, key=lambda name: at[name][wanted])
+        numbers[f"best_at_{_power(wanted)}"] = fastest
+        numbers[f"ratio_to_plain_at_{_power(wanted)}"] = at["plain"][wanted] / at[fastest][wanted]
+    results = [course.result for curve in curves for course in curve.courses if course.result]
+    numbers |= {"mesh": "see the CSV", "turns": 1 if quick else 3, **cost(results)}
+    header = ("curve", "mesh", "tolerance_or_step", "unknowns", "seconds", "seconds_min", "seconds_max", "setup_seconds")
+    header += ("area_error", "pressure_error", "steps", "newton_iterations", "factorisations", "solves")  # type: ignore[assignment]
+    return Findings(draw(curves, reference), header, rows, numbers)
+
+
+def _power(wanted: float) -> str:
+    return f"1e-{round(-np.log10(wanted))}"
+
+
+def draw(curves: Sequence[Curve], reference: Reference) -> Figure:
+    """Errors of area and pressure over seconds of the time loop."""
+    figure, (left, right) = plt.subplots(1, 2, figsize=(9.6, 4.2), sharex=True)
+    for number, curve in enumerate(curves):
+        style = {"marker": curve.marker, "color": str(0.65 * number / len(curves)), "ms": 5, "lw": 1.0}
+        line = "--" if curve.name in ("plain", "paper") else "-"
+        left.loglog(curve.seconds, [reference.area_error(c) for c in curve.courses], line, label=curve.label, **style)
+        if all(course.pressures is not None for course in curve.courses):
+            right.loglog(curve.seconds, [reference.pressure_error(c) for c in curve.courses], line, **style)
+    left.set(xlabel="seconds of the time loop", ylabel="error of the area, largest over time / area at 7000 s")
+    right.set(xlabel="seconds of the time loop", ylabel="error of the pressure, rms / rms, worst picture")
+    figure.legend(loc="outside lower center", ncols=3, fontsize=8)
+    return figure
