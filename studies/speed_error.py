@@ -7,7 +7,7 @@ take turns. For each curve NAME of the figure:
 
 - `NAME_seconds_at_1e-2`, `..._1e-3`, `..._1e-4` [s] for that error of the area, on the line through the points that no
   other point of the curve beats in both error and time; `NAME_at_1e-2` and so on: "measured" (between points),
-  "extrapolated" (beyond the most accurate, along the last two), "at most" (the cheapest point is already more accurate);
+  "extrapolated" (beyond the most accurate, with the slope of all), "at most" (the cheapest point is already more accurate);
 - `NAME_setup_seconds` [s]: mesh, spaces, forms and their compilation, for the dearest point of the curve;
 - `ratio_to_plain_at_1e-2`, `..._1e-3`: seconds of the plain script over those of the best of our curves, `best_at_...`;
 - `reference_area_error`, `reference_pressure_error`: what the two references differ by;
@@ -186,11 +186,10 @@ def seconds_at(wanted: float, errors: Sequence[float], seconds: Sequence[float])
     target = np.log(wanted)
     if target >= log_error[0]:
         return best[0][0], "at most"
-    inside = target >= log_error[-1]
-    number = int(np.searchsorted(-log_error, -target)) if inside else len(best) - 1
-    rise = log_time[number] - log_time[number - 1]
-    slope = rise / (log_error[number] - log_error[number - 1]) if number else -1.0
-    return float(np.exp(log_time[number] + slope * (target - log_error[number]))), "measured" if inside else "extrapolated"
+    if target >= log_error[-1]:
+        return float(np.exp(np.interp(-target, -log_error, log_time))), "measured"
+    slope = np.polyfit(log_error, log_time, 1)[0] if len(best) > 1 else -1.0
+    return float(np.exp(log_time[-1] + slope * (target - log_error[-1]))), "extrapolated"
 
 
 def our_curves(quick: bool) -> list[Curve]:
