@@ -10,7 +10,7 @@ from ngswell.materials import TABLE_1, TABLE_2, HolmesMow, MackieMeares, Materia
 from ngswell.meshes import box, check_mesh, column, from_occ, rectangle
 from ngswell.models import Concentration, LocalDonnan, Potential, Uncharged
 from ngswell.newton import Newton
-from ngswell.observers import VTK, Area, Integral, Ledger, Probe, Progress, Snapshots
+from ngswell.observers import VTK, Area, Coarseness, Integral, Ledger, Probe, Progress, Snapshots
 from ngswell.sampling_rules import Averaged, InnerLayer, LeastSquares
 from ngswell.scene import Result, Scene
 from ngswell.schedules import Blend, Ramp
@@ -22,9 +22,10 @@ __version__ = "0.1.0"
 
 __all__ = [
     "BACKWARD_EULER", "ESDIRK4", "TABLE_1", "TABLE_2", "VTK", "Adaptive", "Area", "Averaged", "Axisymmetric", "Bath",
-    "Blend", "Concentration", "Confined", "Essential", "Fixed", "Frozen", "HolmesMow", "InnerLayer", "InputError",
-    "Integral", "Lagged", "LeastSquares", "Ledger", "LocalDonnan", "MackieMeares", "Material", "Multiplier", "Newton",
-    "NgswellError", "Nitsche", "OutputError", "Penalty", "Pin", "PlaneStrain", "Potential", "PowerLaw", "Probe",
-    "Progress", "Ramp", "Result", "Roller", "Scene", "Snapshots", "Solid", "StepError", "Symmetry", "Traction",
-    "Uncharged", "Weight", "box", "check_mesh", "column", "from_occ", "read_mesh", "rectangle",
+    "Blend", "Coarseness", "Concentration", "Confined", "Essential", "Fixed", "Frozen", "HolmesMow", "InnerLayer",
+    "InputError", "Integral", "Lagged", "LeastSquares", "Ledger", "LocalDonnan", "MackieMeares", "Material",
+    "Multiplier", "Newton", "NgswellError", "Nitsche", "OutputError", "Penalty", "Pin", "PlaneStrain", "Potential",
+    "PowerLaw", "Probe", "Progress", "Ramp", "Result", "Roller", "Scene", "Snapshots", "Solid", "StepError",
+    "Symmetry", "Traction", "Uncharged", "Weight", "box", "check_mesh", "column", "from_occ", "read_mesh",
+    "rectangle",
 ]  # fmt: skip
