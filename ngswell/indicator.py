@@ -156,7 +156,7 @@ def _neighbourhoods(mesh: Mesh) -> list[list[int]]:
     next_to: list[set[int]] = [set() for _ in cells]
     for sharing in at_facet.values():
         for cell in sharing:
-            next_to[cell] |= {other for other in sharing if cells[other].index == cells[cell].index}
+            next_to[cell] |= {other for other in sharing if cells[other].mat == cells[cell].mat}
     found = []
     for cell in range(mesh.ne):
         near = next_to[cell] | {cell}

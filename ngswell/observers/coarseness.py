@@ -22,6 +22,10 @@ ALONG = 1 / 3
 """A boundary is named when the worst cells along it hold at least this share of their squared error."""
 
 
+NOTHING = 1e-6
+"""Estimates below this come from Newton's tolerance."""
+
+
 class Worst(NamedTuple):
     """The cell with the largest estimated error: number, centre [mm], time [s], share in the relative error [-], unknown."""
 
@@ -109,7 +113,7 @@ class Coarseness(Observer):
         share = self._along_boundaries(ranked[:count], squares)
         listed = ", ".join(f"{name} ({100 * part:.0f} %)" for name, part in share.items())
         graded = ", ".join(name for name, part in share.items() if part >= ALONG)
-        if squares.sum() == 0:
+        if total[peak] < NOTHING:
             advice = "No gradients to resolve."
         elif count > LARGEST_PART * len(squares):
             advice = "The error is spread over the body: more cells everywhere, or a higher order."
