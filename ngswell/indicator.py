@@ -89,15 +89,13 @@ class _Patches:
     def __init__(self, problem: Problem, around: list[list[int]], order: int) -> None:
         mesh, self._dim = problem.mesh, problem.mesh.dim
         self._sampled, self._points = points(mesh, VOL, 2 * order - 1), points(mesh, VOL, 2 * order)
-        self._weights = (
-            _volumes(mesh, self._points, 2 * order) * _values(CF(problem.kinematics.weight), self._points).ravel()
-        )
+        self._weights = _volumes(mesh, self._points, 2 * order) * CF(problem.kinematics.weight)(self._points).ravel()
         self.volume = float(self._weights.sum())
         self._own = _by_cell(mesh, self._points)
         samples = _by_cell(mesh, self._sampled)
         self._around = [np.concatenate([samples[cell] for cell in cells]) for cells in around]
         position = CF((x, y, z)[: self._dim])
-        sampled, inside = (_values(position, where).reshape(-1, self._dim) for where in (self._sampled, self._points))
+        sampled, inside = (position(where).reshape(-1, self._dim) for where in (self._sampled, self._points))
         self._recover = []
         for own, nearby, mine in zip(self._own, self._around, samples, strict=True):
             centre, size = inside[own].mean(axis=0), np.ptp(sampled[nearby], axis=0).max() or 1.0
@@ -107,34 +105,20 @@ class _Patches:
 
     def errors(self, gradient: CoefficientFunction) -> tuple[NDArray, float]:
         """Norm over each cell of recovered minus actual gradient, and the norm of the gradient over the body."""
-        # Rows: points and directions; columns: components of the unknown.
-        sampled, inside = (
-            _values(gradient, where).reshape(len(where), -1, self._dim).swapaxes(1, 2)
-            for where in (self._sampled, self._points)
-        )
-        squares = np.array(
-            [
-                self._weights[own]
-                @ ((recover @ _rows(sampled[nearby]) - _rows(inside[own])) ** 2).reshape(len(own), -1).sum(axis=1)
-                for own, nearby, recover in zip(self._own, self._around, self._recover, strict=True)
-            ]
-        )
+        shape = (-1, gradient.dim // self._dim, self._dim)
+        sampled, inside = (gradient(where).reshape(shape).swapaxes(1, 2) for where in (self._sampled, self._points))
+        squares = np.empty(len(self._own))
+        for cell, (own, nearby, recover) in enumerate(zip(self._own, self._around, self._recover, strict=True)):
+            recovered = recover @ sampled[nearby].reshape(-1, shape[1])  # rows by point and direction
+            squares[cell] = self._weights[own] @ ((recovered.reshape(inside[own].shape) - inside[own]) ** 2).sum(axis=(1, 2))
         return np.sqrt(squares), float(np.sqrt(self._weights @ (inside**2).sum(axis=(1, 2))))
-
-
-def _rows(values: NDArray) -> NDArray:
-    return values.reshape(-1, values.shape[-1])
-
-
-def _values(field: CoefficientFunction, where: NDArray) -> NDArray:
-    return np.asarray(field(where))
 
 
 def _volumes(mesh: Mesh, where: NDArray, order: int) -> NDArray:
     """Volume that each of the integration points of degree `order` stands for."""
     rules = {shape: np.array(IntegrationRule(shape, order).weights) for shape in {cell.type for cell in mesh.Elements(VOL)}}
     weights = np.concatenate([rules[cell.type] for cell in mesh.Elements(VOL)])
-    mapping = _values(specialcf.JacobianMatrix(mesh.dim), where).reshape(-1, mesh.dim, mesh.dim)
+    mapping = specialcf.JacobianMatrix(mesh.dim)(where).reshape(-1, mesh.dim, mesh.dim)
     return weights * np.abs(np.linalg.det(mapping))
 
 

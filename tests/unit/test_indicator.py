@@ -113,7 +113,7 @@ def put(problem, excess):
         field.Set(CF(tuple((k + 1) * value for k in range(mesh.dim))) if vector else value)
 
 
-# Round-off of gradients, 1e-15, times the condition of the fits: up to 1e3 for tetrahedra.
+# Round-off of gradients, amplified by interpolation and by the fits.
 ROUND_OFF = 1e-11
 
 
