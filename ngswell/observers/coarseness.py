@@ -44,7 +44,8 @@ class Coarseness(Observer):
         print(coarseness.report())
 
     Relative to the run as a whole, because a layer that has just begun is thinner than any cell and does not matter yet.
-    The numbers compare meshes and places; of smooth fields they are the errors, of layers thinner than a cell a lower bound.
+    For smooth fields the numbers are the errors, to some ten percent; where a mesh does not resolve a layer, and for what
+    a cell inherits from others, they are smaller than the errors. They compare meshes and places.
     Raises InputError when asked before a run, or used with a second mesh.
     """
 

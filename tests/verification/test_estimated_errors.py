@@ -72,7 +72,7 @@ def test_the_estimate_is_the_error_of_smooth_fields(shape, order, cells, name):
     # On the way to 1, up to what is left on triangles, where no gradient is of higher order anywhere, and of NGSolve's
     # interpolation, which is not the Galerkin projection.
     assert abs(fine - 1) < max(abs(coarse - 1), 0.1)
-    # The rate, with what is due to the ratio of the two being on its way.
+    # The rates; measured: 0.02 apart, but 0.11 to 0.21 where the ratio is still on its way to 1 (cubic u, hexahedra).
     rates = np.log([estimated[1] / estimated[2], true[1] / true[2]]) / np.log(cells[2] / cells[1])
     assert rates[0] == pytest.approx(rates[1], abs=0.25)
 
@@ -110,6 +110,6 @@ def test_the_worst_cell_of_the_block_lies_at_a_diluted_side():
 def test_grading_towards_the_baths_lowers_the_estimate():
     uniform, graded = swelling(False), swelling(True)
     assert uniform.total[0] < 1e-6  # at rest: Newton's tolerance
-    assert graded.total.max() < 0.8 * uniform.total.max()  # measured: 0.64
+    assert graded.total.max() < 0.8 * uniform.total.max()  # measured: 0.63
     assert (graded.total[1:] < uniform.total[1:]).all()
     assert "top" not in graded.report().splitlines()[-1]
