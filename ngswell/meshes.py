@@ -38,13 +38,33 @@ def column(height: float, cells: int, grade: Grade | None = None) -> Mesh:
     return mesh
 
 
-def rectangle(width: float, height: float, nx: int, ny: int, triangles: bool = False, grade: Grade | None = None) -> Mesh:
+def rectangle(
+    width: float,
+    height: float,
+    nx: int,
+    ny: int,
+    triangles: bool = False,
+    grade: Grade | None = None,
+    lines: dict[str, float] | None = None,
+) -> Mesh:
     """Cells on [0, width] × [0, height] [mm] with boundaries "bottom", "right", "top", "left".
 
     Quadrilaterals, or `triangles`, two in each. `grade` thins the cells towards boundaries, as in `column`.
+    `lines={"x": 0.3}` shifts the cells so that a mesh line lies at x = 0.3 mm: where baths or materials bend within a
+    cell, no order helps.
     """
     _check_sizes("rectangle", (width, height), (nx, ny))
     xs, ys = _graded("rectangle", (width, height), (nx, ny), (("left", "right"), ("bottom", "top")), grade)
+    for axis, place in (lines or {}).items():
+        if axis not in ("x", "y"):
+            raise InputError(f"rectangle: lines names {axis!r}, which is none of x, y")
+        nodes = xs if axis == "x" else ys
+        if not 0 < place < nodes[-1] or len(nodes) < 3:
+            raise InputError(
+                f"rectangle: lines = {{{axis!r}: {place!r}}} mm needs two cells or more in {axis} and a place between 0 and "
+                f"{nodes[-1]:g}"
+            )
+        nodes[:] = _shifted(nodes, place)
     return MakeStructured2DMesh(
         quads=not triangles, nx=nx, ny=ny, mapping=lambda s, t: (xs[round(nx * s)], ys[round(ny * t)])
     )
@@ -178,6 +198,12 @@ def _graded(
         _nodes(size, number, grade.get(low, 1.0), grade.get(high, 1.0))
         for size, number, (low, high) in zip(sizes, cells, sides, strict=True)
     ]
+
+
+def _shifted(nodes: list[float], place: float) -> list[float]:
+    """Nodes with the one nearest to `place` moved there, stretched evenly on either side of it."""
+    number = 1 + int(np.argmin(np.abs(np.array(nodes[1:-1]) - place)))
+    return np.interp(nodes, [0.0, nodes[number], nodes[-1]], [0.0, place, nodes[-1]]).tolist()
 
 
 def _nodes(length: float, cells: int, low: float, high: float) -> list[float]:

@@ -54,6 +54,9 @@ from studies.output import Findings, cost
 
 PICTURES = free_swelling.PICTURES[1:]
 SCRIPT = Path(__file__).resolve().parents[2] / "shared" / "peers" / "plain_ngsolve.py"
+BENDS = {"x": 0.3, "y": 0.3}
+"""Where the blended baths bend [mm]."""
+
 WANTED = (1e-2, 1e-3, 1e-4)
 SAMPLES = np.stack(
     np.meshgrid(WIDTH * (np.arange(24) + 0.497) / 24, HEIGHT * (np.arange(24) + 0.497) / 24), axis=-1
@@ -67,18 +70,17 @@ class Run:
 
     model: Model
     cells: int
-    grade: float  # largest over smallest cell, toward the baths
+    grade: float  # largest over smallest cell, toward the baths; beyond 1, mesh lines also lie where the baths bend
     steps: Adaptive
     penalty: float | None = None  # the paper's ε; None: the model's default
 
     def scene(self) -> Scene:
         paper = free_swelling.scene(1, 1)
         treatment = None if self.penalty is None else Penalty(self.penalty)
+        grade = dict.fromkeys(("top", "left", "bottom"), self.grade)
         return replace(
             paper,
-            mesh=rectangle(
-                WIDTH, HEIGHT, self.cells, self.cells, grade=dict.fromkeys(("top", "left", "bottom"), self.grade)
-            ),
+            mesh=rectangle(WIDTH, HEIGHT, self.cells, self.cells, grade=grade, lines=BENDS if self.grade > 1 else None),
             model=self.model,
             baths=[replace(bath, treatment=treatment) for bath in paper.baths],
         )

@@ -243,6 +243,16 @@ def test_grade_towards_both_ends(cells):
     assert even == pytest.approx(even[::-1], rel=1e-9)
 
 
+@pytest.mark.parametrize(("nx", "ny"), [(2, 2), (7, 4), (8, 12)])
+def test_lines_lie_where_asked(nx, ny):
+    mesh = rectangle(1.1, 1.0, nx, ny, grade={"left": 6.0, "top": 6.0}, lines={"x": 0.3, "y": 0.8})
+    xs, ys = (np.unique(np.round([v.point[axis] for v in mesh.vertices], 12)) for axis in (0, 1))
+    assert (len(xs), len(ys)) == (nx + 1, ny + 1)
+    assert 0.3 in xs
+    assert 0.8 in ys
+    assert (xs[0], xs[-1], ys[0], ys[-1]) == (0.0, 1.1, 0.0, 1.0)
+
+
 def test_ungraded_is_uniform():
     assert lengths(column(3.0, 5)) == pytest.approx(0.6, rel=1e-12)
     assert lengths(column(3.0, 1, grade={"top": 10.0})) == pytest.approx(3.0)
@@ -378,6 +388,9 @@ def test_picture_of_the_deformed_body(name, tmp_path):
         (lambda: box(1.0, 1.0, 1.0, 1, 1, 1, cells="hexes"), "'hexes'.*hexahedra"),
         (lambda: column(1.0, 3, grade={"left": 2.0}), "'left'.*bottom, top"),
         (lambda: rectangle(1.0, 1.0, 3, 3, grade={"top": 0.5}), "0.5 at 'top'"),
+        (lambda: rectangle(1.0, 1.0, 3, 3, lines={"z": 0.5}), "'z', which is none of x, y"),
+        (lambda: rectangle(1.0, 1.0, 3, 3, lines={"x": 1.5}), "1.5.*between 0 and 1"),
+        (lambda: rectangle(1.0, 1.0, 1, 3, lines={"x": 0.5}), "two cells"),
         (lambda: rectangle(1.0, 1.0, 3, 3, grade={"top": float("nan")}), "nan at 'top'"),
         (lambda: from_occ(WorkPlane().Circle(1.0).Face(), 0.5), "no boundary has a name.*edges"),
         (lambda: from_occ(Box((0, 0, 0), (1, 1, 1)), 0.5), "no boundary has a name.*faces"),
