@@ -13,7 +13,18 @@ from ngswell.plotting import use_style
 from studies.output import prepare, write
 
 PAPER = ("boundary_charge", "oscillation", "free_swelling")
-STUDIES = (*PAPER, "convergence", "cylinder", "reductions", "speed_error", "stability", "treatments", "verification")
+STUDIES = (
+    *PAPER,
+    "convergence",
+    "cylinder",
+    "iteration",
+    "reductions",
+    "speed_error",
+    "stability",
+    "tolerance",
+    "treatments",
+    "verification",
+)
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -13,6 +13,7 @@ from __future__ import annotations
 import matplotlib.pyplot as plt
 
 from ngswell import (
+    BACKWARD_EULER,
     TABLE_1,
     Adaptive,
     Bath,
@@ -60,7 +61,9 @@ def run(quick: bool = False) -> Findings:
     for name, treatment in cases.items():
         probes[name] = Probe((HEIGHT,), "displacement")
         progress = Progress(f"boundary_charge {name}")
-        results[name] = scene(treatment, cells).run(AT_REST, Adaptive(tolerance), [probes[name], progress])
+        results[name] = scene(treatment, cells).run(
+            AT_REST, Adaptive(tolerance, scheme=BACKWARD_EULER), [probes[name], progress]
+        )
 
     boundary_charges = {"following": None, "frozen": TABLE_1.cfc0}
     numbers: dict[str, float | int | str] = {}

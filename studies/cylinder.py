@@ -29,6 +29,7 @@ from ngsolve import CF, ET, IfPos, IntegrationRule, x, y, z
 from numpy.typing import NDArray
 
 from ngswell import (
+    BACKWARD_EULER,
     TABLE_2,
     Adaptive,
     Area,
@@ -131,8 +132,9 @@ def course(
     at_rim = None if rim is None else Probe(rim, "displacement")
     swollen = body.equilibrate(INITIAL)
     observers = [volume, at_core, ledger, snapshots, Progress(f"cylinder {label}")] + ([at_rim] if at_rim else [])
-    result = body.run(END, Adaptive(tolerance), observers, resume=swollen)
-    rest = body.run(AT_REST, Adaptive(tolerance), [resting, Progress(f"cylinder {label} to rest")], resume=result.end)
+    steps = Adaptive(tolerance, scheme=BACKWARD_EULER)
+    result = body.run(END, steps, observers, resume=swollen)
+    rest = body.run(AT_REST, steps, [resting, Progress(f"cylinder {label} to rest")], resume=result.end)
     return Course(body, result, rest, volume, resting, at_core, at_rim, ledger, snapshots)
 
 

@@ -31,6 +31,7 @@ from ngsolve import IfPos, x, y
 from numpy.typing import NDArray
 
 from ngswell import (
+    BACKWARD_EULER,
     TABLE_2,
     Adaptive,
     Area,
@@ -132,7 +133,7 @@ def course(nx: int, ny: int, tolerance: float, from_rest: bool = False) -> Cours
     pictures = Snapshots([time for time in PICTURES if time >= (INITIAL if from_rest else 0.0)])
     label = f"free_swelling {nx} x {ny}, tolerance {tolerance:g}"
     observers = [area, core, corner, bottom, ledger, pictures, Progress(label)]
-    result = block.run(END, Adaptive(tolerance), observers, resume=begin)
+    result = block.run(END, Adaptive(tolerance, scheme=BACKWARD_EULER), observers, resume=begin)
     return Course(block, result, area, core, corner, bottom, ledger, pictures)
 
 
@@ -144,7 +145,7 @@ def run(quick: bool = False, from_rest: bool = False) -> Findings:
     finer_step = course(nx, ny, tolerance / 4, from_rest)
     rest = Area()
     progress = Progress("free_swelling to rest")
-    to_rest = base.scene.run(AT_REST, Adaptive(tolerance), [rest, progress], resume=base.result.end)
+    to_rest = base.scene.run(AT_REST, Adaptive(tolerance, scheme=BACKWARD_EULER), [rest, progress], resume=base.result.end)
 
     swollen = homogeneous_equilibrium(TABLE_2, SIDE.values[0], "plane strain")
     final = homogeneous_equilibrium(TABLE_2, SIDE.values[-1], "plane strain")
@@ -189,7 +190,7 @@ def run(quick: bool = False, from_rest: bool = False) -> Findings:
 
 def direct_against_ramp(block: Scene, tolerance: float) -> dict[str, float]:
     """The swollen state at 7000 s, by the ramp of the charge and by `equilibrate`: what each costs."""
-    ramp = block.run(INITIAL, Adaptive(tolerance), [Progress("free_swelling ramp")])
+    ramp = block.run(INITIAL, Adaptive(tolerance, scheme=BACKWARD_EULER), [Progress("free_swelling ramp")])
     clock = perf_counter()
     block.equilibrate(INITIAL)
     direct = perf_counter() - clock

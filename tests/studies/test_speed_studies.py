@@ -1,0 +1,68 @@
+"""The studies of speed and of errors in time, at their quick size."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from test_studies import quick
+
+from studies import speed_error
+from studies.__main__ import main
+from studies.speed_error import Course, Reference, seconds_at
+
+
+def test_seconds_at_an_error():
+    seconds, errors = [1.0, 4.0, 16.0, 20.0], [1e-2, 1e-3, 1e-4, 5e-4]  # the last point is beaten by the third
+    assert seconds_at(1e-3, errors, seconds) == (pytest.approx(4.0), "measured")
+    assert seconds_at(10**-3.5, errors, seconds) == (pytest.approx(8.0), "measured")  # half way, both logarithmic
+    assert seconds_at(1e-5, errors, seconds) == (pytest.approx(64.0), "extrapolated")
+    assert seconds_at(1e-1, errors, seconds) == (1.0, "at most")
+
+
+def test_reference_is_cubic_between_kinks():
+    # Cubics are met exactly; the polynomial must not reach over a kink at 7080 s.
+    def history(time):
+        return 1 + 1e-9 * (time - 7080) ** 3 + np.maximum(time - 7080, 0) * 1e-2
+
+    own = np.concatenate([np.linspace(7000, 7080, 9), np.linspace(7080, 7220, 11)[1:]])
+    wanted = np.array([7003.0, 7079.0, 7080.0, 7081.0, 7219.0])
+    reference = Reference(Course(own, history(own), None, 0, []))
+    assert reference.area(wanted) == pytest.approx(history(wanted), rel=1e-12)
+    across = Reference(Course(own, history(own), None, 0, []), kinks=(7000.0, 7220.0))
+    assert np.abs(across.area(wanted) - history(wanted)).max() > 1e-3
+
+
+def test_speed_error(tmp_path, monkeypatch):
+    monkeypatch.setattr(speed_error, "SCRIPT", tmp_path / "plain_ngsolve.py")  # absent: said, and the ratios left out
+    numbers, rows = quick("speed_error", tmp_path / "out")
+    assert "absent" in numbers["plain"]
+    assert not [key for key in numbers if key.startswith("ratio")]
+    assert numbers["reference_area_error"] < 1e-3  # tolerances of 1e-4 and 3e-4
+    assert numbers["penalty_40_area_error"] < 1e-3
+    errors = {(row[0], row[1]): float(row[8]) for row in rows[1:]}
+    assert errors["potential_order_2_graded", "6 x 6"] < errors["potential_order_2_uniform", "6 x 6"]  # same cells and steps
+    assert errors["paper", "4 x 4"] > 10 * numbers["reference_area_error"]
+
+
+def test_a_plain_script_that_does_not_exist_is_refused(tmp_path, capsys):
+    with pytest.raises(SystemExit):
+        main(["speed_error", "--plain", str(tmp_path / "none.py")])
+    assert "none.py" in capsys.readouterr().err
+
+
+def test_iteration(tmp_path):
+    numbers, _ = quick("iteration", tmp_path)
+    for case in ("potential_44x40_1t", "concentration_88x80_1t"):
+        # No times are compared: machines are shared. Old matrices serve several iterations whatever the machine does.
+        assert numbers[f"{case}_iterations_per_matrix"] > 2
+        assert all(numbers[f"{case}_{part}_ms"] > 0 for part in ("tangent", "residual", "factorise", "solve", "iteration"))
+
+
+def test_tolerance(tmp_path):
+    numbers, _ = quick("tolerance", tmp_path)
+    assert numbers["largest_ratio"] < 3
+    assert numbers["smallest_ratio_from_1e-3"] > 1 / 6  # on the full size 0.41; a block of 4 x 4 cells is stiffer
+    # Backward Euler controls its local error: what accumulates is an order larger, the control this study is about.
+    assert (
+        numbers["column_potential_euler_1e-2_displacement_error"] > 10 * numbers["column_potential_1e-2_displacement_error"]
+    )
