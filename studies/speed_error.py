@@ -205,10 +205,10 @@ def our_curves(quick: bool) -> list[Curve]:
         makers = [partial(compute, run, f"{name} {run.cells}") for run in runs]
         return Curve(label, name, marker, makers, [(f"{run.cells} x {run.cells}", run.steps.tolerance) for run in runs])
 
-    second = [(4, 1e-1), (6, 3e-2)] if quick else [(6, 3e-2), (8, 1e-2), (12, 3e-3), (16, 1e-3), (24, 3e-4), (36, 1e-4)]
-    third = [(3, 1e-1), (5, 3e-2)] if quick else [(3, 1e-1), (4, 3e-2), (6, 3e-3), (8, 1e-3), (12, 1e-4), (16, 3e-5)]
-    fourth = [(2, 1e-1), (4, 3e-2)] if quick else [(3, 1e-1), (4, 1e-2), (5, 3e-3), (6, 1e-3), (8, 1e-4), (10, 3e-5)]
-    uniform = [(4, 1e-1), (6, 3e-2)] if quick else [(6, 3e-2), (11, 1e-2), (22, 1e-3), (44, 1e-3)]
+    second = [(4, 1e-1), (6, 3e-2)] if quick else [(6, 3e-2), (8, 1e-2), (12, 3e-3), (16, 1e-3), (24, 3e-4)]
+    third = [(3, 1e-1), (5, 3e-2)] if quick else [(3, 1e-1), (4, 1e-2), (6, 1e-3), (8, 3e-4), (8, 1e-4), (12, 3e-5)]
+    fourth = [(2, 1e-1), (4, 3e-2)] if quick else [(3, 1e-2), (4, 1e-3), (6, 3e-4), (6, 1e-4), (8, 3e-5)]
+    uniform = [(4, 1e-1), (6, 3e-2)] if quick else [(6, 3e-2), (11, 1e-2), (22, 1e-3)]
     return [
         curve("Potential order 2 uniform", "s", Potential(2), 1.0, uniform),
         curve("Potential order 2 graded", "o", Potential(2), 6.0, second),
@@ -221,7 +221,7 @@ def our_curves(quick: bool) -> list[Curve]:
 
 def paper_curve(quick: bool) -> Curve:
     """The paper's way: concentrations, its penalty, uniform cells, backward Euler (with our control of the error)."""
-    points = [(4, 1e-2)] if quick else [(11, 1e-2), (22, 1e-3), (33, 3e-4)]
+    points = [(4, 1e-2)] if quick else [(11, 1e-2), (16, 3e-3), (22, 1e-3)]
     runs = [
         Run(Concentration(), cells, 1.0, Adaptive(tolerance, scheme=BACKWARD_EULER), 40.0) for cells, tolerance in points
     ]
@@ -231,7 +231,7 @@ def paper_curve(quick: bool) -> Curve:
 
 
 def plain_curve(script: Path, quick: bool) -> Curve:
-    points = [((4, 4), 200.0)] if quick else [((11, 10), 40.0), ((22, 20), 20.0), ((33, 30), 10.0)]
+    points = [((4, 4), 200.0)] if quick else [((11, 10), 40.0), ((16, 15), 30.0), ((22, 20), 20.0)]
     makers = [partial(compute_plain, script, cells, step) for cells, step in points]
     settings = [(f"{nx} x {ny}", step) for (nx, ny), step in points]
     return Curve("plain", "plain NGSolve script", "+", makers, settings)
@@ -240,8 +240,8 @@ def plain_curve(script: Path, quick: bool) -> Curve:
 def run(quick: bool = False, plain: Path | None = None) -> Findings:
     """All curves, their points three times in turns, and what they say."""
     script = SCRIPT if plain is None else plain
-    best = Run(Potential(3), 8, 6.0, Adaptive(1e-4)) if quick else Run(Potential(4), 16, 6.0, Adaptive(1e-6))
-    other = Run(Potential(3), 6, 6.0, Adaptive(3e-4)) if quick else Run(Potential(3), 24, 8.0, Adaptive(3e-6))
+    best = Run(Potential(3), 8, 6.0, Adaptive(1e-4)) if quick else Run(Potential(4), 14, 10.0, Adaptive(5e-6))
+    other = Run(Potential(3), 6, 6.0, Adaptive(3e-4)) if quick else Run(Potential(3), 20, 12.0, Adaptive(1e-5))
     reference = Reference(compute(best, "reference"))
     check = compute(other, "second reference")
     numbers: dict[str, float | int | str] = {
