@@ -11,6 +11,7 @@ take turns. For each curve NAME of the figure:
 - `NAME_setup_seconds` [s]: mesh, spaces, forms and their compilation, for the dearest point of the curve;
 - `ratio_to_plain_at_1e-2`, `..._1e-3`: seconds of the plain script over those of the best of our curves, `best_at_...`;
 - `reference_area_error`, `reference_pressure_error`: what the two references differ by;
+- `threads`: NGS_NUM_THREADS, for the plain script as well;
 - `penalty_40_area_error`: what the paper's penalty itself changes, on one mesh with one tolerance.
 
 The plain script is no part of the project: `--plain PATH` names it, or it lies in ../shared/peers beside the checkout; else
@@ -32,6 +33,7 @@ from time import perf_counter
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.figure import Figure
+from ngsolve import ngsglobals
 from numpy.typing import NDArray
 
 from ngswell import (
@@ -290,7 +292,7 @@ def run(quick: bool = False, plain: Path | None = None) -> Findings:
         numbers[f"best_at_{_power(wanted)}"] = fastest
         numbers[f"ratio_to_plain_at_{_power(wanted)}"] = at["plain"][wanted] / at[fastest][wanted]
     results = [course.result for curve in curves for course in curve.courses if course.result]
-    numbers |= {"mesh": "see the CSV", "turns": 1 if quick else 3, **cost(results)}
+    numbers |= {"mesh": "see the CSV", "turns": 1 if quick else 3, "threads": ngsglobals.numthreads, **cost(results)}
     header = ("curve", "mesh", "tolerance_or_step", "unknowns", "seconds", "seconds_min", "seconds_max", "setup_seconds")
     header += ("area_error", "pressure_error", "steps", "newton_iterations", "factorisations", "solves")  # type: ignore[assignment]
     return Findings(draw(curves, reference), header, rows, numbers)
