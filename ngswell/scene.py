@@ -205,8 +205,8 @@ class Scene:
         for bath in self.baths:
             if isinstance(self.treatment(bath), Lagged) and control.scheme is not BACKWARD_EULER:
                 raise InputError(
-                    f"bath on {bath.boundary!r}: {self.treatment(bath)} follows the last step, which needs backward Euler, "
-                    f"not {control.scheme}: steps={type(control).__name__}(..., scheme=BACKWARD_EULER)"
+                    f"bath on {bath.boundary!r}, {self.treatment(bath)}: that is a condition of backward Euler, not of "
+                    f"{control.scheme}; run with steps={type(control).__name__}(..., scheme=BACKWARD_EULER)"
                 )
 
     # -- what models and problems ask ----------------------------------------------------------------------------------

@@ -13,6 +13,9 @@ from ngswell import (
     Concentration,
     Essential,
     Fixed,
+    InputError,
+    Lagged,
+    Ledger,
     Newton,
     Nitsche,
     Penalty,
@@ -73,3 +76,52 @@ def test_tolerance_is_the_error_reached(choice, tolerance):
     assert error > tolerance / 10  # not bought with needless steps
     assert len(result.steps) < 60  # backward Euler would need a thousand for 1e-4
     assert result.factorisations < 1.5 * len(result.steps)  # five stages with one matrix
+
+
+@pytest.mark.parametrize("choice", ["Concentration", "Potential"])
+def test_ledger_closes_to_what_the_nonlinear_solves_leave(choice):
+    def imbalance(newton):
+        ledger = Ledger()
+        column(choice).run(300.0, Adaptive(1e-3), [ledger], newton=newton)
+        return max(ledger.imbalance().values())
+
+    assert imbalance(Newton()) < 1e-10  # quadratic remainders of full Newton iterations
+    loose = imbalance(None)
+    assert 1e-10 < loose < 1e-3  # solves to 3e-6; stiff fluxes amplify what they leave, up to the tolerance itself
+
+
+def test_old_matrices_serve_and_change_nothing():
+    kept, own = Probe((0.5,), "displacement"), Probe((0.5,), "displacement")
+    few = column("Potential").run(300.0, Fixed(10.0, ESDIRK4), [kept], newton=Newton(1e-10, slowest=0.3))
+    many = column("Potential").run(300.0, Fixed(10.0, ESDIRK4), [own], newton=Newton(1e-10))
+    assert few.factorisations < many.factorisations / 10
+    # Both solve to 1e-10 of the fields, 0.5 mm for u; 30 steps of five stages.
+    assert kept.values["displacement"] == pytest.approx(own.values["displacement"], abs=150 * 1e-10 * 0.5)
+
+
+def test_vanishing_anions_are_left_to_backward_euler():
+    # At 1e-9 mol/l stages that weigh rates negatively have no solution; the step says what it tried, the run goes on.
+    scene = confined_column(Essential(), c=1e-9, model=Potential(3), cells=10, initial=(0.15, 0.0))
+    result = scene.run(1e5, Adaptive(1e-2))
+    reasons = [reason for step in result.steps for reason in step.rejected]
+    assert any("stalls" in reason or "positive" in reason or "error" in reason for reason in reasons)
+    salt = scene.problem.vector[scene.problem.ranges["salt"]]
+    assert salt[: scene.mesh.nv].min() > 0  # values at the vertices
+    assert salt[: scene.mesh.nv].max() < 1e-6
+
+
+def test_lagged_baths_need_backward_euler():
+    scene = confined_column(Lagged(), c=FALLING, cells=4)
+    with pytest.raises(InputError, match=r"'top', prescribed with the charge of the last step.*scheme=BACKWARD_EULER"):
+        scene.run(10.0, Adaptive(1e-2))
+    assert len(scene.run(10.0, Adaptive(1e-2, scheme=BACKWARD_EULER)).steps) > 3
+
+
+def test_resumed_runs_reach_the_same_error():
+    # A resumed run starts from the rate at its state, not from rest.
+    through, first, second = (Probe((0.5,), "displacement") for _ in range(3))
+    column("Potential").run(80.0, Adaptive(1e-4), [through])
+    half = column("Potential").run(33.0, Adaptive(1e-4), [first]).end
+    column("Potential").run(80.0, Adaptive(1e-4), [second], resume=half)
+    ends = [probe.values["displacement"].ravel()[-1] for probe in (through, second)]
+    assert ends[0] == pytest.approx(ends[1], rel=2 * 3e-4)  # each within three times its tolerance
