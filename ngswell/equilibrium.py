@@ -10,7 +10,7 @@ from ngswell.baths import Frozen, Lagged
 from ngswell.errors import InputError, StepError
 from ngswell.newton import Newton, Outcome
 from ngswell.problem import Snapshot
-from ngswell.solvers import LinearSolver
+from ngswell.solvers import solver_of
 
 if TYPE_CHECKING:
     from ngswell.scene import Scene
@@ -38,7 +38,7 @@ def equilibrate(scene: Scene, time: float | None = None, newton: Newton | None =
             raise InputError(f"equilibrate: the bath on {bath.boundary!r} remembers the past ({scene.treatment(bath)})")
     problem, method = scene.problem, newton or Newton()
     problem.initialise(charge_share=0.0)
-    solver = LinearSolver(problem.free)
+    solver = solver_of(problem)
 
     def solve(share: float, guess: NDArray) -> Outcome:
         problem.begin_step(time, STATIONARY, guess, charge_share=share)

@@ -47,17 +47,14 @@ class Newton:
     def solve(self, problem: Problem, solver: LinearSolver) -> Outcome:
         """Iterate from the fields of `problem`, in place."""
         vector = problem.vector
-        residual, correction, simplified, right, gap = (problem.fields.vec.CreateVector() for _ in range(5))
+        residual, correction, simplified, gap = (problem.fields.vec.CreateVector() for _ in range(4))
 
         def solve(solution: BaseVector) -> bool:
             excess = problem.gap()
             if not excess.any():
                 return solver.solve(residual, solution)
             gap.FV().NumPy()[:] = excess
-            right.data = residual - solver.matrix * gap
-            solved = solver.solve(right, solution)
-            solution.data += gap
-            return solved
+            return solver.solve(residual, solution, gap)
 
         def size(change: BaseVector) -> float:
             values = change.FV().NumPy()
@@ -80,7 +77,7 @@ class Newton:
         renew = not self._may_keep(solver)
         known = False  # whether `correction` answers the present residual
         for count in range(1, self.most_iterations + 1):
-            if renew and not solver.factorise(problem.linearise()):
+            if renew and not solver.renew(problem):
                 return failure(count, "the linear system is singular or not finite")
             if (renew or not known) and not solve(correction):
                 return failure(count, "the linear system is singular or not finite")

@@ -121,7 +121,7 @@ class Problem:
         self._system = BilinearForm(self.space)
         self._contents = BilinearForm(self.space)
         for term in self.terms:
-            self._system += self.integral(term, 1 / self.dt if term.kind == "rate" else None)
+            self._system += self._in_system(term)
             if term.kind == "rate":
                 self._contents += self.integral(term)
         self._charges: dict[str | None, Any] = {None: None}
@@ -155,6 +155,9 @@ class Problem:
             return integrand * ds(definedon=region, bonus_intorder=BONUS_ORDER, skeleton=term.normal_derivatives)
         integral = integrand * dx(bonus_intorder=BONUS_ORDER)
         return Variation(integral) if term.kind == "energy" else integral
+
+    def _in_system(self, term: Term) -> Any:
+        return self.integral(term, 1 / self.dt if term.kind == "rate" else None)
 
     def form(self, term: Term) -> BilinearForm:
         """One term alone, for ledgers and tests."""
@@ -305,6 +308,20 @@ class Problem:
         """dr/dx at the present fields, on all degrees of freedom."""
         self._system.AssembleLinearization(self.fields.vec)
         return self._system.mat
+
+    @cached_property
+    def condensed(self) -> BilinearForm | None:
+        """The system without the unknowns inside cells, to be assembled like `linearise`; None where it gains nothing.
+
+        Integrals over cell sides with normal derivatives reach inside the cells, from outside what NGSolve eliminates.
+        """
+        inside = sum(self.space.FreeDofs()) - sum(self.space.FreeDofs(True))
+        if not inside or any(term.normal_derivatives for term in self.terms):
+            return None
+        form = BilinearForm(self.space, condense=True)
+        for term in self.terms:
+            form += self._in_system(term)
+        return form
 
     def contents(self, result: BaseVector) -> None:
         """S at the present fields: its sum over the vertex functions of p or c is the fluid or the salt held."""

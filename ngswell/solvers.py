@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from functools import cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 from netgen.meshing import NgException
 from ngsolve import H1, BaseMatrix, BaseVector, BilinearForm, BitArray, dx
 from ngsolve.meshes import Make1DMesh
+
+if TYPE_CHECKING:
+    from ngswell.problem import Problem
 
 
 @cache
@@ -53,15 +57,55 @@ class LinearSolver:
         self.ready = True
         return True
 
-    @property
-    def matrix(self) -> BaseMatrix:
-        """What was factorised last."""
-        return self._matrix
+    def linearise(self, problem: Problem) -> BaseMatrix:
+        """The matrix to factorise, at the present fields."""
+        return problem.linearise()
 
-    def solve(self, right: BaseVector, solution: BaseVector) -> bool:
-        """solution = A⁻¹ right; False if the result is not finite."""
+    def renew(self, problem: Problem) -> bool:
+        """Linearise and factorise; False as `factorise`."""
+        return self.factorise(self.linearise(problem))
+
+    def solve(self, right: BaseVector, solution: BaseVector, prescribed: BaseVector | None = None) -> bool:
+        """solution = A⁻¹ right, with `prescribed` values where degrees of freedom are not free; False if not finite."""
         if self._inverse is None:
             raise RuntimeError("factorise before solving")
-        solution.data = self._inverse * right
+        if prescribed is None:
+            solution.data = self._inverse * right
+        else:
+            moved = right.CreateVector()  # the inverse does not work in place
+            moved.data = right - self._matrix * prescribed
+            solution.data = self._inverse * moved
+            solution.data += prescribed
         self.solves += 1
         return bool(np.isfinite(solution.FV().NumPy()).all())
+
+
+class CondensedSolver(LinearSolver):
+    """The same for the system of a problem, with the unknowns inside cells eliminated cell by cell.
+
+    The factorisation is of their Schur complement: A_bb − A_bi A_ii⁻¹ A_ib.
+    """
+
+    def __init__(self, form: BilinearForm, free: BitArray, name: str | None = None) -> None:
+        super().__init__(free & form.space.FreeDofs(True), name)
+        self._form = form
+
+    def linearise(self, problem: Problem) -> BaseMatrix:
+        self._form.AssembleLinearization(problem.fields.vec)
+        return self._form.mat
+
+    def solve(self, right: BaseVector, solution: BaseVector, prescribed: BaseVector | None = None) -> bool:
+        reduced = right.CreateVector()
+        reduced.data = right
+        reduced.data += self._form.harmonic_extension_trans * right
+        solved = super().solve(reduced, solution, prescribed)
+        solution.data += self._form.inner_solve * right
+        solution.data += self._form.harmonic_extension * solution
+        return solved and bool(np.isfinite(solution.FV().NumPy()).all())
+
+
+def solver_of(problem: Problem) -> LinearSolver:
+    """The solver for the steps of a problem."""
+    if problem.condensed is None:
+        return LinearSolver(problem.free)
+    return CondensedSolver(problem.condensed, problem.free)

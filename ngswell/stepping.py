@@ -13,7 +13,7 @@ from ngswell.errors import InputError, StepError
 from ngswell.newton import Newton, Outcome
 from ngswell.problem import Problem
 from ngswell.schemes import BACKWARD_EULER, ESDIRK4, Scheme
-from ngswell.solvers import LinearSolver
+from ngswell.solvers import solver_of
 
 
 @dataclass(frozen=True)
@@ -154,7 +154,7 @@ class Stepper:
     def __init__(self, problem: Problem, control: Control, newton: Newton) -> None:
         self.problem, self.control, self.newton = problem, control, newton
         self.scheme = control.scheme
-        self.solver = LinearSolver(problem.free)
+        self.solver = solver_of(problem)
         self.history = _History({name: self._change(name) for name in problem.model.evolving}, [])
         self.wanted: float | None = None
         self._matrix_dt = 0.0

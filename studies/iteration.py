@@ -7,7 +7,7 @@ coarser with --quick) and number of threads (`1t`, `2t`), keys MODEL_MESH_THREAD
 - `full_iteration_ms`: tangent, residual, numeric factorisation and solve together: a Newton iteration with its own matrix;
 - `iteration_ms`: time of the loop over Newton iterations, as it is with old matrices kept; `iterations_per_matrix`;
 - `overhead`: time of the loop over (factorisations × `factorise_ms` + solves × `solve_ms`);
-- `unknowns`, `matrix_bytes_per_unknown`.
+- `unknowns`. What a matrix and its factors take: study `growth`.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from threadpoolctl import threadpool_limits
 
 from ngswell import Adaptive, Concentration, Potential, Progress, Result, Scene
 from ngswell.models import Model
-from ngswell.solvers import LinearSolver
+from ngswell.solvers import solver_of
 from studies import free_swelling
 from studies.free_swelling import INITIAL
 from studies.output import Findings, cost
@@ -41,14 +41,14 @@ def block(model: Model, nx: int, ny: int) -> Scene:
 def alone(scene: Scene, turns: int) -> dict[str, float]:
     """Milliseconds of each part of an iteration at the present state, medians of `turns`."""
     problem = scene.problem
-    solver = LinearSolver(problem.free)
+    solver = solver_of(problem)
     residual, correction = (problem.fields.vec.CreateVector() for _ in range(2))
     with TaskManager(), threadpool_limits(1, user_api="blas"):
-        matrix = problem.linearise()
+        matrix = solver.linearise(problem)
         solver.factorise(matrix)
         problem.residual(residual)
         parts: dict[str, Callable[[], object]] = {
-            "tangent": problem.linearise,
+            "tangent": lambda: solver.linearise(problem),
             "residual": lambda: problem.residual(residual),
             "bounds": problem.inadmissible,
             "factorise": lambda: solver.factorise(matrix),
@@ -81,7 +81,6 @@ def run(quick: bool = False) -> Findings:
                 result = scene.run(UNTIL, Adaptive(1e-3), [Progress(f"iteration {label}")], resume=rest)
                 results.append(result)
                 parts = alone(scene, 3 if quick else 7)
-                matrix = scene.problem.linearise()
                 linear = result.factorisations * parts["factorise"] + result.solves * parts["solve"]
                 found = {
                     **{f"{part}_ms": parts[part] for part in PARTS},
@@ -90,7 +89,6 @@ def run(quick: bool = False) -> Findings:
                     "iterations_per_matrix": result.iterations / result.factorisations,
                     "overhead": 1e3 * result.seconds / linear,
                     "unknowns": scene.problem.space.ndof,
-                    "matrix_bytes_per_unknown": 12 * matrix.nze / scene.problem.space.ndof,
                 }
                 numbers |= {f"{label}_{key}": value for key, value in found.items()}
                 rows.append(

@@ -242,7 +242,7 @@ def plain_curve(script: Path, quick: bool) -> Curve:
 def run(quick: bool = False, plain: Path | None = None) -> Findings:
     """All curves, their points three times in turns, and what they say."""
     script = SCRIPT if plain is None else plain
-    best = Run(Potential(3), 8, 6.0, Adaptive(1e-4)) if quick else Run(Potential(4), 14, 10.0, Adaptive(5e-6))
+    best = Run(Potential(3), 8, 6.0, Adaptive(1e-4)) if quick else Run(Potential(4), 12, 10.0, Adaptive(5e-6))
     other = Run(Potential(3), 6, 6.0, Adaptive(3e-4)) if quick else Run(Potential(3), 20, 12.0, Adaptive(1e-5))
     reference = Reference(compute(best, "reference"))
     check = compute(other, "second reference")
@@ -251,7 +251,7 @@ def run(quick: bool = False, plain: Path | None = None) -> Findings:
         "reference_pressure_error": reference.pressure_error(check),
     }
     exact, weak = (
-        compute(Run(Concentration(3), 4 if quick else 12, 6.0, Adaptive(1e-3 if quick else 1e-5), penalty), "penalty")
+        compute(Run(Concentration(3), 4 if quick else 8, 6.0, Adaptive(1e-3 if quick else 1e-5), penalty), "penalty")
         for penalty in (None, 40.0)
     )
     numbers["penalty_40_area_error"] = Reference(exact).area_error(weak)
