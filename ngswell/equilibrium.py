@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from numpy.typing import NDArray
@@ -9,8 +10,8 @@ from numpy.typing import NDArray
 from ngswell.baths import Frozen, Lagged
 from ngswell.errors import InputError, StepError
 from ngswell.newton import Newton, Outcome
-from ngswell.problem import Snapshot
-from ngswell.solvers import solver_of
+from ngswell.problem import Problem, Snapshot
+from ngswell.solvers import LinearSolver, solver_of
 
 if TYPE_CHECKING:
     from ngswell.scene import Scene
@@ -22,7 +23,12 @@ STATIONARY = 1e30
 """A time step [s] beyond which contents do not change any more."""
 
 
-def equilibrate(scene: Scene, time: float | None = None, newton: Newton | None = None) -> Snapshot:
+def equilibrate(
+    scene: Scene,
+    time: float | None = None,
+    newton: Newton | None = None,
+    make_solver: Callable[[Problem], LinearSolver] = solver_of,
+) -> Snapshot:
     """The state in which the scene comes to rest when its charge and baths stay as they are at `time` [s] (its start).
 
     The stationary balances are solved by continuation: from the uncharged body, already loaded, the charge is raised as
@@ -38,7 +44,7 @@ def equilibrate(scene: Scene, time: float | None = None, newton: Newton | None =
             raise InputError(f"equilibrate: the bath on {bath.boundary!r} remembers the past ({scene.treatment(bath)})")
     problem, method = scene.problem, newton or Newton()
     problem.initialise(charge_share=0.0)
-    solver = solver_of(problem)
+    solver = make_solver(problem)
 
     def solve(share: float, guess: NDArray) -> Outcome:
         problem.begin_step(time, STATIONARY, guess, charge_share=share)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import inf
@@ -26,6 +26,7 @@ from ngswell.problem import Problem, Snapshot
 from ngswell.quadrature import points, vertices, vertices_of
 from ngswell.schedules import Ramp
 from ngswell.schemes import BACKWARD_EULER
+from ngswell.solvers import LinearSolver, solver_of
 from ngswell.stepping import Adaptive, Control, Stepper, StepReport
 from ngswell.supports import Load, Pin, Roller, Support, Symmetry, Traction, Weight
 
@@ -281,9 +282,9 @@ class Scene:
 
     # -- running -------------------------------------------------------------------------------------------------------
 
-    def equilibrate(self, time: float | None = None) -> Snapshot:
+    def equilibrate(self, time: float | None = None, solver: Callable[[Problem], LinearSolver] = solver_of) -> Snapshot:
         """The state of rest for the charge and baths at `time` [s] (the start), without a transient; see `equilibrate`."""
-        return equilibrate(self, time)
+        return equilibrate(self, time, make_solver=solver)
 
     def run(
         self,
@@ -292,8 +293,11 @@ class Scene:
         observers: Sequence[Observer] = (),
         newton: Newton | None = None,
         resume: Snapshot | None = None,
+        solver: Callable[[Problem], LinearSolver] = solver_of,
     ) -> Result:
         """Run to `until` [s] from the start, or from the snapshot `resume` of an earlier run of this scene.
+
+        `solver` makes the linear solver: a direct one, or `TwoLevelSolver` for large bodies in space.
 
         Raises InputError before any computing, OutputError when an observer cannot write, and StepError when no step
         succeeds; the problem's fields then hold the last accepted state.
@@ -320,7 +324,7 @@ class Scene:
                 for observer in observers:
                     observer.start(problem, begin, until)
                     started.append(observer)
-                stepper = Stepper(problem, control, newton or control.newton)
+                stepper = Stepper(problem, control, newton or control.newton, solver(problem))
                 time = begin
                 while time < until:
                     report = stepper.advance(time, kinks, stops)

@@ -13,7 +13,7 @@ from ngswell.errors import InputError, StepError
 from ngswell.newton import Newton, Outcome
 from ngswell.problem import Problem
 from ngswell.schemes import BACKWARD_EULER, ESDIRK4, Scheme
-from ngswell.solvers import solver_of
+from ngswell.solvers import LinearSolver
 
 
 @dataclass(frozen=True)
@@ -151,10 +151,10 @@ class _History:
 class Stepper:
     """Time integration of one run: call `advance` until the end; it lands on every time of `stops`."""
 
-    def __init__(self, problem: Problem, control: Control, newton: Newton) -> None:
+    def __init__(self, problem: Problem, control: Control, newton: Newton, solver: LinearSolver) -> None:
         self.problem, self.control, self.newton = problem, control, newton
         self.scheme = control.scheme
-        self.solver = solver_of(problem)
+        self.solver = solver
         self.history = _History({name: self._change(name) for name in problem.model.evolving}, [])
         self.wanted: float | None = None
         self._matrix_dt = 0.0

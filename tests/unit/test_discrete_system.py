@@ -14,7 +14,9 @@ from ngswell import (
     Bath,
     Concentration,
     Confined,
+    Essential,
     Fixed,
+    Frozen,
     Lagged,
     MackieMeares,
     Material,
@@ -30,13 +32,14 @@ from ngswell import (
     Scene,
     Solid,
     StepError,
+    Symmetry,
     Traction,
     Weight,
     box,
     column,
     rectangle,
 )
-from ngswell.solvers import LinearSolver, best_solver
+from ngswell.solvers import CondensedSolver, LinearSolver, best_solver, solver_of
 from ngswell.weak import normal_size
 
 
@@ -282,6 +285,46 @@ def test_refactorisation_follows_the_matrix(name):
         back = (matrix * solution).Evaluate().FV().NumPy()
         assert back[free] == pytest.approx(right.FV().NumPy()[free], abs=1e-8)
     assert solver.factorisations == 2
+
+
+@pytest.mark.parametrize(
+    ("mesh", "motion", "model", "treatment"),
+    [
+        (rectangle(1.0, 1.0, 3, 3), PlaneStrain(), Potential(), Essential()),
+        (rectangle(1.0, 1.0, 3, 3), PlaneStrain(), Potential(4), Essential()),
+        (rectangle(1.0, 1.0, 3, 3), PlaneStrain(), Concentration(3), Penalty(relative=1e3)),
+        (rectangle(1.0, 1.0, 3, 3, triangles=True), PlaneStrain(), Concentration(4), Frozen()),
+        (box(1.0, 1.0, 1.0, 2, 2, 2), Solid(), Potential(3), Essential()),
+    ],
+    ids=lambda value: str(value) if isinstance(value, (Concentration, Potential)) else None,
+)
+def test_condensed_corrections_are_those_of_the_whole_system(mesh, motion, model, treatment):
+    sides = [name for name in dict.fromkeys(mesh.GetBoundaries()) if name != "top"]
+    supports = [Symmetry(side) for side in sides if side in ("left", "front", "bottom")]
+    bath = Bath("top", c=Ramp((0, 0.2), (1, 0.1)), treatment=treatment)
+    scene = Scene(mesh=mesh, kinematics=motion, material=TABLE_2, model=model, supports=supports, baths=[bath])
+    problem = scene.problem
+    deformed(problem)
+    problem.begin_step(1.0, 0.5)
+    solvers = LinearSolver(problem.free), solver_of(problem)
+    assert isinstance(solvers[1], CondensedSolver)
+    right, gap, whole, condensed = (problem.fields.vec.CreateVector() for _ in range(4))
+    problem.residual(right)
+    gap.FV().NumPy()[:] = problem.gap()
+    for solver, solution in zip(solvers, (whole, condensed), strict=True):
+        assert solver.renew(problem)
+        assert solver.solve(right, solution, gap if isinstance(treatment, (Essential, Frozen)) else None)
+    free = np.array(list(problem.free))
+    size = np.abs(whole.FV().NumPy()[free]).max()
+    # Round-off times the condition of systems of up to some 400 unknowns in mixed units.
+    assert condensed.FV().NumPy() == pytest.approx(whole.FV().NumPy(), abs=1e-9 * size)
+    assert size > 1e-6
+
+
+def test_side_integrals_with_normal_derivatives_are_not_condensed():
+    # They reach the unknowns inside the cells, from outside the cell-wise elimination.
+    scene = confined_column(Nitsche(), cells=3)
+    assert type(solver_of(scene.problem)) is LinearSolver
 
 
 def test_nan_in_the_matrix_is_noticed():
