@@ -62,8 +62,13 @@ class LinearSolver:
         return problem.linearise()
 
     def renew(self, problem: Problem) -> bool:
-        """Linearise and factorise; False as `factorise`."""
-        return self.factorise(self.linearise(problem))
+        """Linearise and factorise; False as `factorise`, or where a cell's own unknowns cannot be eliminated."""
+        try:
+            matrix = self.linearise(problem)
+        except NgException:
+            self.ready = False
+            return False
+        return self.factorise(matrix)
 
     def solve(self, right: BaseVector, solution: BaseVector, prescribed: BaseVector | None = None) -> bool:
         """solution = A⁻¹ right, with `prescribed` values where degrees of freedom are not free; False if not finite."""
