@@ -6,6 +6,7 @@ from ngswell.baths import Bath, Essential, Frozen, Lagged, Multiplier, Nitsche, 
 from ngswell.errors import InputError, NgswellError, OutputError, StepError
 from ngswell.gmsh import read_mesh
 from ngswell.kinematics import Axisymmetric, Confined, PlaneStrain, Solid
+from ngswell.krylov import TwoLevelSolver
 from ngswell.materials import TABLE_1, TABLE_2, HolmesMow, MackieMeares, Material, PowerLaw
 from ngswell.meshes import box, check_mesh, column, from_occ, rectangle
 from ngswell.models import Concentration, LocalDonnan, Potential, Uncharged
@@ -26,6 +27,6 @@ __all__ = [
     "InputError", "Integral", "Lagged", "LeastSquares", "Ledger", "LocalDonnan", "MackieMeares", "Material",
     "Multiplier", "Newton", "NgswellError", "Nitsche", "OutputError", "Penalty", "Pin", "PlaneStrain", "Potential",
     "PowerLaw", "Probe", "Progress", "Ramp", "Result", "Roller", "Scene", "Snapshots", "Solid", "StepError",
-    "Symmetry", "Traction", "Uncharged", "Weight", "box", "check_mesh", "column", "from_occ", "read_mesh",
-    "rectangle",
+    "Symmetry", "Traction", "TwoLevelSolver", "Uncharged", "Weight", "box", "check_mesh", "column", "from_occ",
+    "read_mesh", "rectangle",
 ]  # fmt: skip

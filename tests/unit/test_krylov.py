@@ -1,0 +1,194 @@
+"""The two-level solver against the direct one, and when it changes its coarse level."""
+
+import numpy as np
+import pytest
+from ngsolve import BaseMatrix, TaskManager
+from threadpoolctl import threadpool_limits
+
+from ngswell import (
+    TABLE_2,
+    Adaptive,
+    Area,
+    Bath,
+    Concentration,
+    Newton,
+    Penalty,
+    PlaneStrain,
+    Potential,
+    Ramp,
+    Scene,
+    Solid,
+    Symmetry,
+    box,
+    rectangle,
+)
+from ngswell.krylov import EASY, MOST_ITERATIONS, TwoLevelSolver, gmres, units
+from ngswell.solvers import LinearSolver, solver_of
+
+DILUTION = Ramp((0, 4.1), (80, 2.7))
+
+
+@pytest.fixture(autouse=True)
+def _threads():
+    with TaskManager(), threadpool_limits(1, user_api="blas"):
+        yield
+
+
+def eighth(n, cells="hexahedra", model=None, treatment=None):
+    return Scene(
+        mesh=box(1.1, 1.1, 0.5, n, n, n, cells=cells),
+        kinematics=Solid(),
+        material=TABLE_2,
+        model=model or Potential(),
+        supports=[Symmetry("left"), Symmetry("front"), Symmetry("bottom")],
+        baths=[Bath("right|back|top", c=DILUTION, treatment=treatment)],
+    )
+
+
+def quarter(n):
+    return Scene(
+        mesh=rectangle(1.1, 0.5, 2 * n, n),
+        kinematics=PlaneStrain(),
+        material=TABLE_2,
+        supports=[Symmetry("left"), Symmetry("bottom")],
+        baths=[Bath("right|top", c=DILUTION)],
+    )
+
+
+def swollen(scene):
+    """The problem at rest in 4.1 mol/l: its state."""
+    return scene.equilibrate(0.0).values
+
+
+def system(problem, state, dt):
+    """Matrix and right-hand side of the first iteration of a step."""
+    problem.vector[:] = state
+    problem.begin_step(dt, dt)
+    matrix = problem.linearise()
+    right, gap = problem.fields.vec.CreateVector(), problem.fields.vec.CreateVector()
+    problem.residual(right)
+    gap.FV().NumPy()[:] = problem.gap()
+    right.data -= matrix * gap
+    return matrix, right
+
+
+def solved(solver, matrix, right):
+    solution = right.CreateVector()
+    assert solver.factorise(matrix)
+    assert solver.solve(right, solution)
+    return solution.FV().NumPy().copy()
+
+
+@pytest.mark.parametrize(
+    "scene",
+    [
+        eighth(4),
+        eighth(3, cells="tetrahedra"),
+        eighth(3, cells="prisms"),
+        eighth(2, model=Potential(order=3)),
+        eighth(3, model=Concentration(), treatment=Penalty(40.0)),
+        quarter(6),
+    ],
+    ids=["hexahedra", "tetrahedra", "prisms", "order 3", "concentration", "plane"],
+)
+def test_the_direct_solution(scene):
+    problem = scene.problem
+    state = swollen(scene)
+    for dt in (10.0, 0.1):
+        matrix, right = system(problem, state, dt)
+        exact = solved(LinearSolver(problem.free), matrix, right)
+        found = solved(TwoLevelSolver(problem), matrix, right)
+        size = np.abs(exact / units(problem)).max()
+        # The preconditioned residual falls by 1e-8; it differs from the error by how good the preconditioner is, which
+        # for forty iterations is a factor of some hundreds.
+        assert np.abs((found - exact) / units(problem)).max() < 1e-5 * size
+        # Residuals on constrained degrees of freedom are reactions; nothing of them enters the solution.
+        assert not found[~np.array(list(problem.free), bool)].any()
+
+
+def test_the_coarse_level_follows_the_step():
+    scene = eighth(5)
+    problem, state = scene.problem, swollen(scene)
+    solver = TwoLevelSolver(problem)
+    solved(solver, *system(problem, state, 100.0))
+    assert not solver.with_facets
+    assert solver.iterations < 15
+    # A step a thousand times shorter than h²/[(2µ + λ) K] = 170 s: volume is all but preserved.
+    matrix, right = system(problem, state, 0.01)
+    solved(solver, matrix, right)
+    assert solver.with_facets
+    assert EASY < solver.iterations < MOST_ITERATIONS
+    # A long step is easy again, and the next matrix gets the smaller level.
+    solved(solver, *system(problem, state, 100.0))
+    assert solver.with_facets
+    assert solver.iterations <= EASY
+    solved(solver, *system(problem, state, 100.0))
+    assert not solver.with_facets
+    assert solver.factorisations == 4
+
+
+def test_newtons_method_takes_it():
+    ends, counts = [], []
+    for make in (lambda problem: LinearSolver(problem.free), TwoLevelSolver):
+        scene = eighth(3)
+        problem = scene.problem
+        problem.vector[:] = swollen(scene)
+        problem.begin_step(10.0, 10.0)
+        outcome = Newton().solve(problem, make(problem))
+        assert outcome.reason is None
+        counts.append(outcome.iterations)
+        ends.append(problem.vector / units(problem))
+    assert counts[0] == counts[1]
+    np.testing.assert_allclose(ends[1], ends[0], atol=1e-8)  # Newton's tolerance
+
+
+class _Nothing(BaseMatrix):
+    """No preconditioner at all."""
+
+    def __init__(self, size):
+        super().__init__()
+        self.size = size
+
+    def Height(self):
+        return self.size
+
+    def Width(self):
+        return self.size
+
+    def Mult(self, right, result):
+        result.data = right
+
+
+def test_failures_are_told():
+    scene = eighth(2)
+    problem, state = scene.problem, swollen(scene)
+    matrix, right = system(problem, state, 10.0)
+    solver = TwoLevelSolver(problem)
+    with pytest.raises(RuntimeError, match="factorise"):
+        solver.solve(right, right.CreateVector())
+    # What the preconditioner is for: forty iterations without one do not solve the system.
+    assert gmres(matrix, _Nothing(problem.space.ndof), units(problem), right, right.CreateVector(), 40) is None
+    matrix.AsVector().FV().NumPy()[0] = np.nan
+    assert not solver.factorise(matrix)
+
+
+def test_a_singular_matrix_is_told():
+    scene = eighth(2)
+    problem, state = scene.problem, swollen(scene)
+    matrix, _ = system(problem, state, 10.0)
+    matrix.AsVector().FV().NumPy()[:] = 0.0
+    solver = TwoLevelSolver(problem)
+    assert not (solver.factorise(matrix) and solver.solve(*(problem.fields.vec.CreateVector() for _ in range(2))))
+
+
+def test_runs_take_the_two_level_solver():
+    # The whole way, from rest through a dilution with old matrices kept: the direct solver's volumes.
+    volumes = []
+    for solver in (solver_of, TwoLevelSolver):
+        scene, volume = eighth(3), Area()
+        rest = scene.equilibrate(0.0, solver=solver)
+        scene.run(80.0, Adaptive(1e-2), [volume], resume=rest, solver=solver)
+        volumes.append(volume.values)
+    assert len(volumes[0]) == len(volumes[1])  # the same steps
+    assert volumes[0] == pytest.approx(volumes[1], rel=1e-8)  # GMRES to 1e-8 of each correction
+    assert np.abs(volumes[0] / volumes[0][0] - 1).max() > 1e-3
