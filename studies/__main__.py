@@ -17,6 +17,7 @@ STUDIES = (
     *PAPER,
     "convergence",
     "cylinder",
+    "growth",
     "iteration",
     "reductions",
     "speed_error",

@@ -1,0 +1,44 @@
+"""The study of time and memory over size at its quick size. Seconds depend on who else computes: none is tested."""
+
+import pytest
+from test_studies import quick
+
+from studies.growth import QUICK_CELLS, STEPS, TIMES
+
+
+def unknowns(dimension, cells):
+    """Displacement of order 2, two fields of order 1."""
+    sides = {2: (round(1.1 * cells), cells), 3: (cells,) * 3}[dimension]
+    second = first = 1
+    for side in sides:
+        second, first = second * (2 * side + 1), first * (side + 1)
+    return dimension * second + 2 * first
+
+
+def test_growth(tmp_path):
+    numbers, rows = quick("growth", tmp_path)
+    solvers = {"umfpack", "two-level", numbers["linear_solver"]}
+    header, sizes = rows[0], [dict(zip(rows[0], row, strict=True)) for row in rows[1:]]
+    assert {f"{part}_s" for part in TIMES} <= set(header)
+    assert len(sizes) == len(solvers) * sum(map(len, QUICK_CELLS.values()))
+    for size in sizes:
+        assert int(size["unknowns"]) == unknowns(int(size["dimension"]), int(size["cells"]))
+        assert int(size["peak_bytes"]) > int(size["factor_bytes"]) > 0
+        assert float(size["first_s"]) > 0
+
+    for d, cells in QUICK_CELLS.items():
+        assert numbers[f"largest_unknowns_{d}d"] == unknowns(d, cells[-1])
+        # A matrix takes so much per unknown; on so few cells the boundary and the allocator's steps still show.
+        assert numbers[f"exponent_assembly_memory_{d}d"] == pytest.approx(1, abs=0.25)
+        # Patches and a coarse level of a quarter of the unknowns against factors of the whole.
+        assert numbers[f"two_level_over_direct_memory_{d}d"] < 0.8
+        assert 1 < numbers[f"two_level_iterations_{d}d"] < 20
+
+    # Fluid has time to cross a cell in 100 s, not in 0.1 s.
+    assert numbers["two_level_facets_3d_dt_100"] == 0
+    assert numbers["two_level_facets_3d_dt_0.1"] == 1
+    assert all(0 < numbers[f"two_level_iterations_3d_dt_{dt:g}"] <= 40 for dt in STEPS)
+    # An old factorisation is a good preconditioner for its own step and a worse one the further the step is from it.
+    recycled = {dt: numbers[f"recycled_iterations_3d_dt_{dt:g}"] for dt in STEPS}
+    assert 0 < recycled[10.0] < recycled[1.0] < recycled[0.1]
+    assert recycled[10.0] < recycled[100.0]
