@@ -217,7 +217,7 @@ class Recycled(BaseMatrix):
         self.solver.solve(right, result)
 
 
-def try_steps(problem: Problem, solver: LinearSolver | TwoLevelSolver, now: float) -> list[Trial]:
+def try_steps(problem: Problem, solver: LinearSolver, now: float) -> list[Trial]:
     """First systems of steps of several sizes: by the two-level solver, or by GMRES on the factorisation at hand."""
     found, state, solution = [], problem.vector.copy(), problem.fields.vec.CreateVector()
     for dt in STEPS:
@@ -225,7 +225,7 @@ def try_steps(problem: Problem, solver: LinearSolver | TwoLevelSolver, now: floa
         problem.begin_step(now + dt, dt)
         matrix = problem.linearise()
         right = right_hand_side(problem, matrix)
-        if isinstance(solver, LinearSolver):
+        if not isinstance(solver, TwoLevelSolver):
             start = perf_counter()
             old = Recycled(solver, problem.space.ndof)
             iterations = gmres(matrix, old, units(problem), right, solution, most=150)
