@@ -52,7 +52,7 @@ def test_a_plain_script_that_does_not_exist_is_refused(tmp_path, capsys):
 
 def test_iteration(tmp_path):
     numbers, _ = quick("iteration", tmp_path)
-    for case in ("potential_44x40_1t", "concentration_88x80_1t"):
+    for case in ("potential_44x40", "concentration_88x80"):
         # No times are compared: machines are shared. Old matrices serve several iterations whatever the machine does.
         assert numbers[f"{case}_iterations_per_matrix"] > 2
         assert all(numbers[f"{case}_{part}_ms"] > 0 for part in ("tangent", "residual", "factorise", "solve", "iteration"))
