@@ -322,7 +322,7 @@ def draw(curves: Sequence[Curve], reference: Reference) -> Figure:
         left.loglog(curve.seconds, [reference.area_error(c) for c in curve.courses], line, label=curve.label, **style)
         if all(course.pressures is not None for course in curve.courses):
             right.loglog(curve.seconds, [reference.pressure_error(c) for c in curve.courses], line, **style)
-    left.set(xlabel="seconds of the time loop", ylabel="error of the area, largest over time / area at 7000 s")
-    right.set(xlabel="seconds of the time loop", ylabel="error of the pressure, rms / rms, worst picture")
+    left.set(xlabel="seconds of the time loop", ylabel="largest error of the area / area at 7000 s")
+    right.set(xlabel="seconds of the time loop", ylabel="error of the pressure, rms / rms")
     figure.legend(loc="outside lower center", ncols=3, fontsize=8)
     return figure
