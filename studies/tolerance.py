@@ -151,5 +151,5 @@ def draw(curves: dict[tuple[str, str, str], list[float]], tolerances: tuple[floa
                 ax.loglog(asked[: len(errors)], errors, line, label=f"{name.replace('_', ', ')}: {quantity}", **style)
         ax.set(title=title, xlabel="tolerance asked for")
     axes[0].set(ylabel="largest error in time reached")
-    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=4, fontsize=8)
+    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=3, fontsize=8)
     return figure
