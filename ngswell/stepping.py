@@ -292,7 +292,8 @@ class Stepper:
         self._next_slope = slopes[-1]
         right, error = self._work
         right.FV().NumPy()[:] = scheme.difference @ np.array(slopes) / scheme.diagonal
-        self.solver.solve(right, error)
+        if not self.solver.solve(right, error):
+            return Outcome(iterations, "the estimated error is not finite", *problem.worst(problem.vector - old)), inf
         return Outcome(iterations), self._relative(error.FV().NumPy())
 
     def _relative(self, difference: NDArray) -> float:
