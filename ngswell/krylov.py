@@ -74,20 +74,10 @@ class TwoLevelSolver(LinearSolver):
         self.ready = True
         return True
 
-    def solve(self, right: BaseVector, solution: BaseVector, prescribed: BaseVector | None = None) -> bool:
-        """solution = A⁻¹ right, with `prescribed` values where degrees of freedom are not free; False if not converged."""
+    def _invert(self, right: BaseVector, solution: BaseVector) -> bool:
+        """A⁻¹ on the free degrees of freedom; False if GMRES does not converge."""
         if self._matrix is None or self._smoother is None:
             raise RuntimeError("factorise before solving")
-        self.solves += 1
-        if prescribed is not None:
-            moved = right.CreateVector()
-            moved.data = right - self._matrix * prescribed
-            solved = self._on_both_levels(moved, solution)
-            solution.data += prescribed
-            return solved
-        return self._on_both_levels(right, solution)
-
-    def _on_both_levels(self, right: BaseVector, solution: BaseVector) -> bool:
         if self._level == 0:
             if self._gmres(right, solution, MOST_ITERATIONS):
                 return True

@@ -72,17 +72,22 @@ class LinearSolver:
 
     def solve(self, right: BaseVector, solution: BaseVector, prescribed: BaseVector | None = None) -> bool:
         """solution = A⁻¹ right, with `prescribed` values where degrees of freedom are not free; False if not finite."""
-        if self._inverse is None:
-            raise RuntimeError("factorise before solving")
         if prescribed is None:
-            solution.data = self._inverse * right
+            solved = self._invert(right, solution)
         else:
-            moved = right.CreateVector()  # the inverse does not work in place
+            moved = right.CreateVector()
             moved.data = right - self._matrix * prescribed
-            solution.data = self._inverse * moved
+            solved = self._invert(moved, solution)
             solution.data += prescribed
         self.solves += 1
-        return bool(np.isfinite(solution.FV().NumPy()).all())
+        return solved and bool(np.isfinite(solution.FV().NumPy()).all())
+
+    def _invert(self, right: BaseVector, solution: BaseVector) -> bool:
+        """A⁻¹ on the free degrees of freedom, zero elsewhere; not in place."""
+        if self._inverse is None:
+            raise RuntimeError("factorise before solving")
+        solution.data = self._inverse * right
+        return True
 
 
 class CondensedSolver(LinearSolver):

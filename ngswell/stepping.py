@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import inf
 from typing import Protocol
@@ -163,7 +164,7 @@ class Stepper:
         self._balances = np.zeros(problem.vector.size, dtype=bool)
         for name in problem.model.held.values():
             self._balances[problem.ranges[name]] = True
-        self._slope = self._outflow()
+        self._slope = self._next_slope = self._outflow() if self.scheme.explicit_start else np.zeros(0)
 
     def _outflow(self) -> NDArray:
         """R of the balances of contents, at the present fields and time."""
@@ -249,8 +250,8 @@ class Stepper:
     def _backward_euler(self, time: float, end: float, old: NDArray) -> tuple[Outcome, float]:
         """One step and its error, by extrapolation from the step before: see `_error`."""
         problem, dt = self.problem, end - time
-        contents = self._contents()
-        guess = _extrapolated(self.history.points[-2:], end) if self.history.points else None
+        contents = self._contents() if self.scheme.explicit_start else None
+        guess = polynomial_at(self.history.points[-2:], end) if self.history.points else None
         problem.begin_step(end, dt, guess)
         outcome = self._solve(dt)
         if outcome.reason and guess is not None:  # the extrapolation may be what is inadmissible
@@ -258,7 +259,8 @@ class Stepper:
             problem.begin_step(end, dt)
             outcome = self._solve(dt)
         problem.stages = [(dt, end, problem.vector.copy())]
-        self._next_slope = (contents - self._contents()) / dt
+        if contents is not None:
+            self._next_slope = (contents - self._contents()) / dt
         return outcome, self._error(old, guess, dt) if outcome.reason is None else inf
 
     def _runge_kutta(self, scheme: Scheme, time: float, end: float, old: NDArray) -> tuple[Outcome, float]:
@@ -277,7 +279,7 @@ class Stepper:
         for row, share, weight in list(zip(scheme.rows, scheme.times, scheme.weights, strict=True))[1:]:
             at = end if share == 1.0 else time + share * dt
             start = contents - dt * (np.array(row[:-1]) @ np.array(slopes))
-            guess = _extrapolated(sorted(points, key=lambda point: abs(point[0] - at))[:3], at)
+            guess = polynomial_at(sorted(points, key=lambda point: abs(point[0] - at))[:3], at)
             problem.begin_stage(at, inner, start, guess)
             outcome = self._solve(inner)
             if outcome.reason:
@@ -318,8 +320,8 @@ class Stepper:
         return max(floor, self.history.changes[name])
 
 
-def _extrapolated(points: list[tuple[float, NDArray]], time: float) -> NDArray:
-    """The polynomial through (time, state) points, at `time`."""
+def polynomial_at(points: Sequence[tuple[float, NDArray]], time: float) -> NDArray:
+    """The polynomial through (time, value) points, at `time`; values are numbers or arrays."""
     times = np.array([at for at, _ in points])
     weights = [np.prod([(time - other) / (at - other) for other in times if other != at]) for at in times]
     return np.array(weights) @ np.array([values for _, values in points])

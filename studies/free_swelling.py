@@ -17,7 +17,7 @@ rest. Numbers (areas are relative to the area at 7000 s; errors are estimates of
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from time import perf_counter
 
 import matplotlib.pyplot as plt
@@ -52,6 +52,8 @@ from ngswell import (
     rectangle,
 )
 from ngswell.analytic import homogeneous_equilibrium
+from ngswell.baths import Treatment
+from ngswell.models import Model
 from ngswell.plotting import on_deformed_body
 from studies.output import Findings, cost
 
@@ -84,6 +86,11 @@ def scene(nx: int, ny: int) -> Scene:
             Bath("bottom", c=Blend(BOTTOM, SIDE, fading(x)), treatment=weak),
         ],
     )
+
+
+def remodelled(paper: Scene, model: Model, treatment: Treatment | None = None) -> Scene:
+    """A scene with another model, its baths imposed by `treatment` or as that model does by default."""
+    return replace(paper, model=model, baths=[replace(bath, treatment=treatment) for bath in paper.baths])
 
 
 @dataclass(frozen=True)

@@ -43,7 +43,7 @@ from ngsolve import CF, BaseMatrix, BaseVector, TaskManager, x, y, z
 from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
-from ngswell import TABLE_2, Bath, Potential, Ramp, Scene
+from ngswell import TABLE_2, Potential, Ramp, Scene
 from ngswell.analytic import homogeneous_equilibrium
 from ngswell.krylov import TwoLevelSolver, gmres, units
 from ngswell.problem import Problem
@@ -110,14 +110,9 @@ class Size:
 def body(dimension: int, cells: int) -> Scene:
     """The block in plane strain, or the eighth of one in space; swollen at the start, exact baths."""
     if dimension == 3:
-        scene = cylinder.block(cells)
-        return replace(scene, baths=exact(scene.baths))
+        return free_swelling.remodelled(cylinder.block(cells), Potential())
     scene = free_swelling.scene(round(WIDTH * cells), cells)
-    return replace(scene, model=Potential(), baths=exact(scene.baths), charge=Ramp((0, 1.0)), start=INITIAL)
-
-
-def exact(baths: Sequence[Bath]) -> list[Bath]:
-    return [replace(bath, treatment=None) for bath in baths]
+    return replace(free_swelling.remodelled(scene, Potential()), charge=Ramp((0, 1.0)), start=INITIAL)
 
 
 def swell(problem: Problem) -> None:

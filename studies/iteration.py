@@ -13,7 +13,6 @@ Tolerance 1e-3, both models with their default baths, one thread. For each MODEL
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from statistics import median
 from time import perf_counter
 
@@ -23,7 +22,6 @@ from ngsolve import SetNumThreads, TaskManager, ngsglobals
 from threadpoolctl import threadpool_limits
 
 from ngswell import Adaptive, Concentration, Potential, Progress, Result, Scene
-from ngswell.models import Model
 from ngswell.solvers import solver_of
 from studies import free_swelling
 from studies.free_swelling import INITIAL
@@ -31,11 +29,6 @@ from studies.output import Findings, cost
 
 UNTIL = 7220.0  # s
 PARTS = ("tangent", "residual", "bounds", "factorise", "solve")
-
-
-def block(model: Model, nx: int, ny: int) -> Scene:
-    paper = free_swelling.scene(nx, ny)
-    return replace(paper, model=model, baths=[replace(bath, treatment=None) for bath in paper.baths])
 
 
 def alone(scene: Scene, turns: int) -> dict[str, float]:
@@ -74,7 +67,7 @@ def run(quick: bool = False) -> Findings:
     SetNumThreads(1)
     for name, (nx, ny) in zip(names, meshes, strict=True):
         for model in (Potential(), Concentration()):
-            scene = block(model, nx, ny)
+            scene = free_swelling.remodelled(free_swelling.scene(nx, ny), model)
             rest = scene.equilibrate(INITIAL)
             label = f"{type(model).__name__.lower()}_{name}"
             result = scene.run(UNTIL, Adaptive(1e-3), [Progress(f"iteration {label}")], resume=rest)

@@ -50,6 +50,7 @@ from ngswell import (
     rectangle,
 )
 from ngswell.models import Model
+from ngswell.stepping import polynomial_at
 from studies import free_swelling
 from studies.free_swelling import END, HEIGHT, INITIAL, WIDTH
 from studies.output import Findings, cost
@@ -77,15 +78,10 @@ class Run:
     penalty: float | None = None  # the paper's ε; None: the model's default
 
     def scene(self) -> Scene:
-        paper = free_swelling.scene(1, 1)
         treatment = None if self.penalty is None else Penalty(self.penalty)
         grade = dict.fromkeys(("top", "left", "bottom"), self.grade)
-        return replace(
-            paper,
-            mesh=rectangle(WIDTH, HEIGHT, self.cells, self.cells, grade=grade, lines=BENDS if self.grade > 1 else None),
-            model=self.model,
-            baths=[replace(bath, treatment=treatment) for bath in paper.baths],
-        )
+        mesh = rectangle(WIDTH, HEIGHT, self.cells, self.cells, grade=grade, lines=BENDS if self.grade > 1 else None)
+        return replace(free_swelling.remodelled(free_swelling.scene(1, 1), self.model, treatment), mesh=mesh)
 
 
 @dataclass
@@ -143,9 +139,7 @@ class Reference:
             before = max(kink for kink in self.kinks if kink < after)
             inside = np.flatnonzero((self.course.time >= before - 1e-6) & (self.course.time <= after + 1e-6))
             near = inside[np.argsort(np.abs(self.course.time[inside] - at))[:4]]
-            times = self.course.time[near]
-            weights = [np.prod([(at - other) / (own - other) for other in times if other != own]) for own in times]
-            values[number] = np.array(weights) @ self.course.area[near]
+            values[number] = polynomial_at([(self.course.time[n], self.course.area[n]) for n in near], at)
         return values
 
     def area_error(self, course: Course) -> float:
@@ -205,16 +199,18 @@ def seconds_at(wanted: float, errors: Sequence[float], seconds: Sequence[float])
     return float(np.exp(log_time[-1] + slope * (target - log_error[-1]))), "extrapolated"
 
 
+def through(name: str, label: str, marker: str, runs: Sequence[Run]) -> Curve:
+    """The curve of our own runs."""
+    makers = [partial(compute, run, f"{label} {run.cells}") for run in runs]
+    return Curve(name, label, marker, makers, [(f"{run.cells} x {run.cells}", run.steps.tolerance) for run in runs])
+
+
 def our_curves(quick: bool) -> list[Curve]:
     """Per model, mesh family and order: meshes and tolerances that belong together."""
 
-    def curve(
-        name: str, marker: str, model: Model, grade: float, points: Sequence[tuple[int, float]], **ways: float
-    ) -> Curve:
-        label = name.lower().replace(" ", "_").replace(",", "")
+    def curve(name: str, marker: str, model: Model, grade: float, points: Sequence[tuple[int, float]]) -> Curve:
         runs = [Run(model, cells, grade, Adaptive(tolerance)) for cells, tolerance in points]
-        makers = [partial(compute, run, f"{name} {run.cells}") for run in runs]
-        return Curve(label, name, marker, makers, [(f"{run.cells} x {run.cells}", run.steps.tolerance) for run in runs])
+        return through(name.lower().replace(" ", "_"), name, marker, runs)
 
     second = [(4, 1e-1), (6, 3e-2)] if quick else [(6, 3e-2), (8, 1e-2), (12, 3e-3), (16, 1e-3), (24, 3e-4)]
     third = [(3, 1e-1), (5, 3e-2)] if quick else [(3, 1e-1), (4, 1e-2), (6, 1e-3), (8, 3e-4), (8, 1e-4), (12, 3e-5)]
@@ -236,9 +232,7 @@ def paper_curve(quick: bool) -> Curve:
     runs = [
         Run(Concentration(), cells, 1.0, Adaptive(tolerance, scheme=BACKWARD_EULER), 40.0) for cells, tolerance in points
     ]
-    makers = [partial(compute, run, f"paper's way {run.cells}") for run in runs]
-    settings = [(f"{run.cells} x {run.cells}", run.steps.tolerance) for run in runs]
-    return Curve("paper", "as in the paper, backward Euler", "x", makers, settings)
+    return through("paper", "as in the paper, backward Euler", "x", runs)
 
 
 def plain_curve(script: Path, quick: bool) -> Curve:

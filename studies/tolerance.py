@@ -12,7 +12,7 @@ larger error at each tolerance; `smallest_ratio_from_1e-3` without the tolerance
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -37,7 +37,7 @@ from ngswell.models import Model
 from ngswell.problem import Snapshot
 from ngswell.schemes import Scheme
 from studies import boundary_charge, free_swelling
-from studies.free_swelling import END, HEIGHT, INITIAL
+from studies.free_swelling import END, HEIGHT, INITIAL, remodelled
 from studies.output import Findings, cost
 
 MODELS = (Concentration(), Potential())
@@ -67,14 +67,12 @@ class Case:
 
 
 def column(model: Model) -> Case:
-    scene = boundary_charge.scene(Penalty(1.0), 60)
-    scene = replace(scene, model=model, baths=[replace(bath, treatment=None) for bath in scene.baths])
+    scene = remodelled(boundary_charge.scene(Penalty(1.0), 60), model)
     return Case(f"column_{type(model).__name__.lower()}", scene, None, 1500.0, (boundary_charge.HEIGHT,))
 
 
 def block(model: Model, cells: int) -> Case:
-    paper = free_swelling.scene(cells, cells)
-    scene = replace(paper, model=model, baths=[replace(bath, treatment=None) for bath in paper.baths])
+    scene = remodelled(free_swelling.scene(cells, cells), model)
     name = f"block_{type(model).__name__.lower()}"
     return Case(name, scene, scene.equilibrate(INITIAL), END, (0.0, HEIGHT))
 
