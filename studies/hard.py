@@ -1,0 +1,136 @@
+"""What the families of `hard_cases` share: one attempt at a scene, and what came of it."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ngswell import (
+    Concentration,
+    Essential,
+    InputError,
+    Ledger,
+    Multiplier,
+    NgswellError,
+    Nitsche,
+    Penalty,
+    Potential,
+    Result,
+    Scene,
+    StepError,
+)
+from ngswell.baths import Treatment
+from ngswell.models import Model
+from ngswell.newton import Newton
+from ngswell.observers import Observer
+from ngswell.problem import Snapshot
+from ngswell.stepping import Control
+
+CHOICES: dict[str, tuple[Model, Treatment]] = {
+    "Potential": (Potential(), Essential()),
+    "Potential, Penalty": (Potential(), Penalty(relative=1e4)),
+    "Concentration": (Concentration(), Penalty(relative=1e4)),
+    "Concentration, Multiplier": (Concentration(), Multiplier()),
+    "Concentration, Nitsche": (Concentration(), Nitsche()),
+}
+"""Both models with every stable treatment of a bath."""
+
+DEFAULTS = {name: CHOICES[name] for name in ("Potential", "Concentration")}
+"""Both models with the treatment that they take unasked."""
+
+
+@dataclass(frozen=True)
+class Attempt:
+    """What came of one scene.
+
+    `outcome` is "passes" (`error`, a relative one of the quantity `measure`, is within `bound`, and the ledger closes to
+    `ledger_bound`), "stops" (StepError, and the fields hold a usable last state), "refused" (InputError before anything is
+    computed) or "wrong", which must not be. `message` is the exception's, or what is wrong.
+    """
+
+    case: str
+    variant: str
+    outcome: str
+    measure: str
+    error: float | None = None
+    bound: float | None = None
+    imbalance: float | None = None
+    steps: int = 0
+    rejected: int = 0
+    iterations: int = 0
+    seconds: float = 0.0
+    time: float | None = None  # [s] of the last accepted state
+    message: str = ""
+    warnings: tuple[str, ...] = ()
+
+
+def attempt(
+    case: str,
+    variant: str,
+    make: Callable[[], Scene],
+    until: float,
+    measure: str,
+    error: Callable[[Scene, Result], float],
+    bound: float,
+    steps: Control | None = None,
+    observers: Sequence[Observer] = (),
+    start: Callable[[Scene], Snapshot] | None = None,
+    newton: Newton | None = None,
+    ledger_bound: float = 1e-7,
+) -> Attempt:
+    """Make a scene, run it to `until` [s] (from the snapshot that `start` gives, if any), and judge what comes of it.
+
+    `error` takes the finished scene, whose fields hold the last state, and the result. Its `bound` needs a reason.
+    """
+    ledger = Ledger()
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        try:
+            scene = make()
+        except InputError as refused:
+            return Attempt(case, variant, "refused", measure, message=str(refused))
+        try:
+            begin = start(scene) if start else None
+            result = scene.run(until, steps, [*observers, ledger], newton=newton, resume=begin)
+        except StepError as stopped:
+            fault = unusable(scene, stopped.time)
+            outcome = "wrong" if fault else "stops"
+            return Attempt(case, variant, outcome, measure, time=stopped.time, message=fault or str(stopped))
+        except NgswellError as refused:
+            return Attempt(case, variant, "refused", measure, message=str(refused))
+    found, open_by = float(error(scene, result)), max(ledger.imbalance().values())
+    fault = unusable(scene, until)
+    if not found <= bound:
+        fault = fault or f"error {found:.3g} above {bound:.3g}"
+    if not open_by <= ledger_bound:
+        fault = fault or f"the ledger is open by {open_by:.3g}"
+    return Attempt(
+        case,
+        variant,
+        "wrong" if fault else "passes",
+        measure,
+        found,
+        bound,
+        open_by,
+        len(result.steps),
+        result.rejections,
+        result.iterations,
+        result.seconds,
+        until,
+        fault,
+        tuple(dict.fromkeys(str(warning.message) for warning in caught)),
+    )
+
+
+def unusable(scene: Scene, time: float) -> str:
+    """What is wrong with the fields that a run left behind as the state at `time` [s]; empty if nothing is."""
+    problem = scene.problem
+    if not np.isfinite(problem.vector).all():
+        return "the last state is not finite"
+    if problem.time != time:
+        return f"the clock stands at {problem.time:g} s, not at the last state's {time:g} s"
+    found = problem.inadmissible()
+    return f"{found[0]} is not positive in the last state near {found[1]}" if found else ""
