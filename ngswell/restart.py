@@ -72,10 +72,11 @@ class Restart:
             "seconds": self.seconds, "method": self.method, "parts": self.parts,
             "observers": [name for name, _ in self.observers], "steps": [astuple(step) for step in self.steps],
         }  # fmt: skip
-        arrays = {"ngswell": np.array(json.dumps(said).encode()), "fields": self.snapshot.values}
+        arrays = {"fields": self.snapshot.values}
         arrays |= {f"stepper/{key}": value for key, value in self.stepper.items()}
         for number, (_, memory) in enumerate(self.observers):
             arrays |= {f"observer {number}/{key}": value for key, value in memory.items()}
+        arrays["ngswell"] = np.array(json.dumps({**said, "entries": list(arrays)}).encode())
         with replacing(path, "Checkpoint") as new, open(new, "wb") as file:
             np.savez(file, **arrays)  # type: ignore[arg-type]
 
@@ -107,6 +108,8 @@ def read_checkpoint(path: str | Path) -> Restart:
 def _restart(said: dict[str, Any] | None, arrays: Memory, path: Path) -> Restart:
     if said is None:
         raise ValueError("nothing in it is called ngswell")
+    if list(arrays) != said["entries"]:
+        raise ValueError("entries are missing")
 
     def below(prefix: str) -> Memory:
         return {name.removeprefix(prefix): value for name, value in arrays.items() if name.startswith(prefix)}
@@ -143,7 +146,12 @@ def parts(scene: Scene) -> dict[str, str]:
     texts = {name: text_of(getattr(scene, name), inside) for name in _PARTS}
     texts["mesh"] = repr((places.tolist(), cells, shape))
     texts["material"] += repr(laws)
-    texts["baths"] = repr([text_of(bath, points(mesh, mesh.Boundaries(bath.boundary), 4)) for bath in scene.baths])
+    texts["baths"] = repr(
+        [
+            [text_of(bath, inside), text_of(bath, points(mesh, mesh.Boundaries(bath.boundary), 4))]  # the latter none in 1-d
+            for bath in scene.baths
+        ]
+    )
     return {name: sha256(text.encode()).hexdigest() for name, text in texts.items()}
 
 
