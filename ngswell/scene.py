@@ -319,15 +319,13 @@ class Scene:
             raise InputError(f"until = {until:g} s is before the checkpoint, {time:g} s")
         control = Adaptive() if steps is None else steps
         self._check_scheme(control)
+        checkpoints = [observer for observer in observers if isinstance(observer, Checkpoint)]
+        observers = [*(o for o in observers if not isinstance(o, Checkpoint)), *checkpoints]  # these see the others' records
+        if restart is not None:
+            restart.check(self, observers)
         problem = self.problem
         if state is not None and state.values.shape != problem.vector.shape:
             raise InputError(f"resume: the snapshot has {state.values.size} unknowns, the scene {problem.vector.size}")
-        observers = sorted(
-            observers, key=lambda observer: isinstance(observer, Checkpoint)
-        )  # last, with the others' records
-        checkpoints = [observer for observer in observers if isinstance(observer, Checkpoint)]
-        if restart is not None:
-            restart.check(self, observers)
         schedules = [self.charge, *(s for bath in self.baths for s in bath.schedules)]
         kinks = sorted({k for schedule in schedules for k in schedule.kinks if begin < k < until} | {begin, until})
         stops = sorted({s for observer in observers for s in observer.times(begin, until)})

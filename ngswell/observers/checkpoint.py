@@ -26,8 +26,8 @@ class Checkpoint(Observer):
         scene.run(until=8000, observers=[core, checkpoint], resume=checkpoint.read())
 
     is a script that can be killed at any moment and started again. Written when the run starts, then after a step: `every`
-    so many seconds of the clock (0: each step), at the simulated times `when` (on which steps land), on `request()`; and when
-    the run ends, fails with StepError or is interrupted, with the last accepted state. The file is replaced as a whole.
+    so many seconds of the clock (0: each step), at the simulated times `when` (on which steps land), on `request()`; and
+    when the run ends, fails with StepError or is interrupted, with the last accepted state. The file is replaced as a whole.
 
     Ctrl-C lets the present step finish and ends with KeyboardInterrupt, SIGTERM with exit status 143; a second one gives
     the step up. An existing file is refused unless `overwrite` or the run resumes from it. A checkpoint that cannot be

@@ -199,7 +199,7 @@ def test_a_vtk_series_goes_on_from_an_older_checkpoint(tmp_path, one_thread):
     assert seen == [4, 5, 6, 7]  # pieces beyond the checkpoint are not named until they are written again
     assert files(tmp_path) == through
     (tmp_path / "series_step00001.vtu").unlink()
-    with pytest.raises(InputError, match="step00001.*missing"):
+    with pytest.raises(InputError, match=r"step00001.*missing"):
         run(here, until=40.0, resume=read_checkpoint("run"))
 
 
@@ -219,7 +219,7 @@ def written(tmp_path_factory):
         ({"material": replace(ngswell.TABLE_1, mu=ngsolve.x + 0.24)}, "material"),
         ({"material": replace(ngswell.TABLE_1, permeability=lambda K, J, nS: K * J)}, "material"),
         ({"model": Concentration(order=3)}, "model"),
-        ({"c": 0.14, "initial": (0.15, 0.0)}, "baths, initial"),
+        ({"c": 0.14, "initial": (0.15, 0.0)}, "initial, baths"),
         ({"treatment": ngswell.Penalty(2.0)}, "baths"),
         ({"loads": [ngswell.Traction("top", (-0.1,))]}, "loads"),
         ({"charge": Ramp((0, 1.0), (10, 1.1))}, "charge"),
@@ -332,7 +332,7 @@ def test_other_versions(written, tmp_path, monkeypatch):
     said = json.loads(arrays["ngswell"].item())
     arrays["ngswell"] = np.array(json.dumps({**said, "format": 2, "fields": "elsewhere"}).encode())
     np.savez(tmp_path / "later.npz", **arrays)
-    with pytest.raises(InputError, match="checkpoint format 2.*reads format 1"):
+    with pytest.raises(InputError, match=r"checkpoint format 2.*reads format 1"):
         read_checkpoint(tmp_path / "later.npz")
     monkeypatch.setattr(ngswell, "__version__", "0.0.9")
     with pytest.raises(InputError, match=rf"written by {restart.versions}.*this is ngswell 0.0.9"):
