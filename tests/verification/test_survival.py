@@ -226,17 +226,18 @@ def check_what_is_left(folder, errors, said):
     return read_checkpoint(folder / "run")
 
 
-@pytest.mark.parametrize("size", [76, 84, 92, 100, 108])  # kB; so different files are the first that find no room
-def test_a_disk_that_fills_up(size, script, small_disk, tmp_path):
+@pytest.mark.parametrize(
+    ("size", "every", "what"), [(76, 0.0, "Checkpoint: run"), (108, 0.0, "Checkpoint: run"), (76, 3600.0, "VTK: series")]
+)  # kB, s: the file that finds no room
+def test_a_disk_that_fills_up(size, every, what, script, small_disk, tmp_path):
     libc.mount(b"tmpfs", str(small_disk).encode(), b"tmpfs", REMOUNT, f"size={size}k".encode())
-    run = start(script, small_disk)
+    run = start(script, small_disk, every)
     _, errors = run.communicate(timeout=120)
     assert run.returncode == 1
-    left = check_what_is_left(small_disk, errors, "ngswell.errors.OutputError: ")
-    print(errors.splitlines()[-1])
+    left = check_what_is_left(small_disk, errors, f"ngswell.errors.OutputError: {what}")
     assert "could not be written" in errors
     assert "No space left on device" in errors or "is the disk full?" in errors
-    assert 0.0 < left.snapshot.time < 60.0
+    assert (0.0 < left.snapshot.time < 60.0) if every == 0.0 else left.snapshot.time == 0.0
     libc.mount(b"tmpfs", str(small_disk).encode(), b"tmpfs", REMOUNT, b"size=16m")  # space is made
     run = start(script, small_disk)
     assert run.stdout.readline() == f"from {left.snapshot.time:g} s\n"
