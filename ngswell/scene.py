@@ -24,8 +24,10 @@ from ngswell.meshes import check_mesh
 from ngswell.models import Model, Potential
 from ngswell.newton import Newton
 from ngswell.observers.base import Observer
+from ngswell.observers.checkpoint import Checkpoint, Signals, Stopped
 from ngswell.problem import Problem, Snapshot
 from ngswell.quadrature import points, vertices, vertices_of
+from ngswell.restart import Restart, parts, text_of, versions
 from ngswell.schedules import Ramp
 from ngswell.schemes import BACKWARD_EULER
 from ngswell.solvers import LinearSolver, solver_of
@@ -320,48 +322,94 @@ class Scene:
         steps: Control | None = None,
         observers: Sequence[Observer] = (),
         newton: Newton | None = None,
-        resume: Snapshot | None = None,
+        resume: Snapshot | Restart | None = None,
         solver: Callable[[Problem], LinearSolver] = solver_of,
     ) -> Result:
         """Run to `until` [s] from the start, or from the snapshot `resume` of an earlier run of this scene.
 
+        With a `Restart` (`read_checkpoint`) the earlier run goes on, and its observers and Result cover the whole of it;
+        the numbers are those of a run that was not interrupted. With other steps or another solver only its state and
+        records go on.
+
         `solver` makes the linear solver: a direct one, or `TwoLevelSolver` for large bodies in space.
 
         Raises InputError before any computing, OutputError when an observer cannot write, and StepError when no step
-        succeeds; the problem's fields then hold the last accepted state.
+        succeeds. However a run ends, the problem's fields hold the last accepted state; with a `Checkpoint` among the
+        observers, Ctrl-C and SIGTERM end it after the present step.
         """
-        begin = self.start if resume is None else resume.time
+        restart = resume if isinstance(resume, Restart) else None
+        state = resume.snapshot if isinstance(resume, Restart) else resume
+        time = self.start if state is None else state.time
+        begin = time if restart is None else restart.begin
         if not begin < until < inf:
             raise InputError(f"until = {until:g} s is not a time after the start at {begin:g} s")
+        if not time <= until:
+            raise InputError(f"until = {until:g} s is before the checkpoint, {time:g} s")
         control = Adaptive() if steps is None else steps
         self._check_scheme(control)
+        checkpoints = [observer for observer in observers if isinstance(observer, Checkpoint)]
+        observers = [*(o for o in observers if not isinstance(o, Checkpoint)), *checkpoints]  # these see the others' records
+        if restart is not None:
+            restart.check(self, observers)
         problem = self.problem
-        if resume is not None and resume.values.shape != problem.vector.shape:
-            raise InputError(f"resume: the snapshot has {resume.values.size} unknowns, the scene {problem.vector.size}")
+        if state is not None and state.values.shape != problem.vector.shape:
+            raise InputError(f"resume: the snapshot has {state.values.size} unknowns, the scene {problem.vector.size}")
         schedules = [self.charge, *(s for bath in self.baths for s in bath.schedules)]
         kinks = sorted({k for schedule in schedules for k in schedule.kinks if begin < k < until} | {begin, until})
         stops = sorted({s for observer in observers for s in observer.times(begin, until)})
         problem.initialise()
-        if resume is not None:
-            problem.restore(resume)
-        reports: list[StepReport] = []
-        clock = perf_counter()
-        started: list[Observer] = []
-        try:
-            with TaskManager(), threadpool_limits(1, user_api="blas"):
+        if state is not None:
+            problem.restore(state)
+        accepted = problem.snapshot(time)
+        reports = [] if restart is None else list(restart.steps)
+        clock = perf_counter() - (0.0 if restart is None else restart.seconds)
+        with TaskManager(), threadpool_limits(1, user_api="blas"), Signals(guarded=bool(checkpoints)) as signals:
+            started: list[Observer] = []
+            try:
+                scene_parts = parts(self) if checkpoints else {}
+
+                def present() -> Restart:
+                    remembered = tuple((repr(o), {"time": o.time, **o.memory()}) for o in observers if o.remembers)
+                    seconds, steps = perf_counter() - clock, tuple(reports)
+                    return Restart(accepted, begin, steps, seconds, memory, remembered, method, scene_parts, versions())
+
+                memories = iter(() if restart is None else restart.observers)
+                for checkpoint in checkpoints:
+                    checkpoint.follow(present, restart)
                 for observer in observers:
-                    observer.start(problem, begin, until)
+                    if restart is not None and observer.remembers:
+                        observer.resume(problem, begin, until, next(memories)[1])
+                    else:
+                        observer.start(problem, time, until)
                     started.append(observer)
                 stepper = Stepper(problem, control, newton or control.newton, solver(problem))
-                time = begin
-                while time < until:
+                method = text_of((control, stepper.newton, type(stepper.solver).__name__, stepper.solver.name))
+                if restart is not None:
+                    stepper.remember(restart.stepper, same=restart.method == method)
+                memory = stepper.memory()
+                for checkpoint in checkpoints:
+                    checkpoint.save()
+                while time < until and signals.received is None:
+                    signals.stepping = True
                     report = stepper.advance(time, kinks, stops)
+                    signals.stepping = False
                     time = report.time
+                    accepted, memory = problem.snapshot(time), stepper.memory()
                     reports.append(report)
                     for observer in observers:
                         observer.observe(problem, report)
-        finally:
-            for observer in started:
-                observer.finish(problem)
+                for checkpoint in checkpoints:
+                    checkpoint.save()
+            except BaseException as error:
+                problem.restore(accepted)
+                if signals.stepping:  # observers agree with the last accepted step
+                    for checkpoint in checkpoints:
+                        checkpoint.save()
+                if not isinstance(error, Stopped):
+                    raise
+            finally:
+                for observer in started:
+                    observer.finish(problem)
+        signals.end(time, [checkpoint.path for checkpoint in checkpoints])
         seconds = perf_counter() - clock
-        return Result(tuple(reports), problem.snapshot(until), seconds, stepper.solver.factorisations, stepper.solver.solves)
+        return Result(tuple(reports), accepted, seconds, stepper.solver.factorisations, stepper.solver.solves)

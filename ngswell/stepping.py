@@ -159,7 +159,6 @@ class Stepper:
         self.solver = solver
         self.history = _History({name: self._change(name) for name in problem.model.evolving}, [])
         self.wanted: float | None = None
-        self._matrix_dt = 0.0
         self._careful = 0
         self._work = [problem.fields.vec.CreateVector() for _ in range(2)]
         self._balances = np.zeros(problem.vector.size, dtype=bool)
@@ -167,8 +166,39 @@ class Stepper:
             self._balances[problem.ranges[name]] = True
         self._slope = self._next_slope = self._outflow() if self.scheme.explicit_start else np.zeros(0)
 
+    def memory(self) -> dict[str, NDArray]:
+        """All that the next step depends on beside the fields and the scene. Arrays that no step changes, not copies."""
+        kept = {f"solver {name}": value for name, value in self.solver.memory().items()}
+        kept |= {f"field {number}": values for number, (_, values) in enumerate(self.history.points)}
+        if self.wanted is not None:
+            kept["wanted"] = np.array(self.wanted)
+        return kept | {
+            "times": np.array([time for time, _ in self.history.points]),
+            "changes": np.array([self.history.changes[name] for name in self.problem.model.evolving]),
+            "careful": np.array(self._careful),
+            "slope": self._slope,
+        }
+
+    def remember(self, memory: dict[str, NDArray], same: bool) -> None:
+        """Go on as the stepper that gave `memory`; without `same` method, with what does not depend on it.
+
+        Factorising moves the fields and the clock of the problem, which are put back.
+        """
+        self.history.changes = dict(zip(self.problem.model.evolving, memory["changes"].tolist(), strict=True))
+        if not same:
+            return
+        self.history.points = [(time, memory[f"field {number}"]) for number, time in enumerate(memory["times"].tolist())]
+        self.wanted = float(memory["wanted"]) if "wanted" in memory else None
+        self._careful, self._slope = int(memory["careful"]), memory["slope"]
+        present = self.problem.snapshot(self.problem.time)
+        prefix = "solver "
+        of_solver = {name.removeprefix(prefix): value for name, value in memory.items() if name.startswith(prefix)}
+        self.solver.remember(self.problem, of_solver)
+        self.problem.restore(present)
+
     def _outflow(self) -> NDArray:
         """R of the balances of contents, at the present fields and time."""
+        self.problem.dt.Set(1.0)  # to the last digit, R depends on the step that is divided out
         self.problem.outflow(self._work[0])
         return np.where(self._balances, self._work[0].FV().NumPy(), 0.0)
 
@@ -249,16 +279,12 @@ class Stepper:
 
     def _solve(self, dt: float) -> Outcome:
         """The nonlinear system of a stage whose step of backward Euler is `dt`."""
-        change = abs(1 - dt / self._matrix_dt) if self._matrix_dt else inf
+        change = abs(1 - dt / self.solver.factorised.dt) if self.solver.factorised else inf
         if change > SLOWEST:
             self.solver.ready = False
         elif self.solver.contraction is not None:
             self.solver.contraction = max(self.solver.contraction, change)
-        before = self.solver.factorisations
-        outcome = self.newton.solve(self.problem, self.solver)
-        if self.solver.factorisations > before:
-            self._matrix_dt = dt
-        return outcome
+        return self.newton.solve(self.problem, self.solver)
 
     def _backward_euler(self, time: float, end: float, old: NDArray) -> tuple[Outcome, float]:
         """One step and its error, by extrapolation from the step before: see `_error`."""

@@ -63,6 +63,9 @@ def main(arguments: list[str] | None = None) -> int:
     except NgswellError as error:
         print(f"studies: {error}", file=sys.stderr)
         return 1
+    except KeyboardInterrupt:
+        print("studies: interrupted; what was finished is written", file=sys.stderr)
+        return 130
     return 0
 
 

@@ -6,15 +6,16 @@ import csv
 import importlib.metadata
 import json
 import math
-import os
 import platform
 from collections.abc import Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
 from matplotlib.figure import Figure
 
 from ngswell import OutputError, Result, __version__
+from ngswell.files import check_folder, replacing
 from ngswell.solvers import best_solver
 
 SUFFIXES = (".png", ".csv", ".json")
@@ -36,8 +37,7 @@ def prepare(folder: Path, names: Sequence[str], overwrite: bool) -> None:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise OutputError(f"the folder {folder} cannot be made: {error.strerror}") from error
-    if not os.access(folder, os.W_OK | os.X_OK):
-        raise OutputError(f"the folder {folder} cannot be written to")
+    check_folder(folder, "studies")
     for name in names:
         for suffix in SUFFIXES:
             file = folder / (name + suffix)
@@ -46,18 +46,20 @@ def prepare(folder: Path, names: Sequence[str], overwrite: bool) -> None:
 
 
 def write(folder: Path, name: str, findings: Findings) -> None:
-    """Write the three files of a study."""
+    """Write the three files of a study, all or none; raises OutputError."""
     for key, value in findings.numbers.items():
         if isinstance(value, float) and not math.isfinite(value):
             raise ValueError(f"{name}: {key} is {value}")
-    findings.figure.savefig(folder / f"{name}.png")
-    with open(folder / f"{name}.csv", "w", newline="", encoding="utf-8") as file:
-        table = csv.writer(file)
-        table.writerow(findings.header)
-        table.writerows([[f"{x:.10g}" if isinstance(x, float) else x for x in row] for row in findings.rows])
-    with open(folder / f"{name}.json", "w", encoding="utf-8") as file:
-        json.dump({**findings.numbers, **_versions()}, file, indent=2)
-        file.write("\n")
+    with ExitStack() as files:
+        png, table, numbers = (files.enter_context(replacing(folder / (name + suffix), name)) for suffix in SUFFIXES)
+        findings.figure.savefig(png)
+        with open(table, "w", newline="", encoding="utf-8") as file:
+            rows = csv.writer(file)
+            rows.writerow(findings.header)
+            rows.writerows([[f"{x:.10g}" if isinstance(x, float) else x for x in row] for row in findings.rows])
+        with open(numbers, "w", encoding="utf-8") as file:
+            json.dump({**findings.numbers, **_versions()}, file, indent=2)
+            file.write("\n")
 
 
 def cost(results: Sequence[Result]) -> dict[str, float | int]:

@@ -17,12 +17,17 @@ class Observer:
     """Base of all observers. `when` is None (every accepted step), an interval [s] or a list of times [s].
 
     Steps land on the times asked for. Raises InputError for times that the run does not pass.
+
+    A class of one's own defines `record` (or `observe`), and `prepare` for what it needs before. One that also defines
+    `memory` and `remember` goes on in a run resumed from a checkpoint as if nothing had been; others start anew there.
+    `settings` and `when` tell observers of a class apart.
     """
 
-    def __init__(self, when: float | Sequence[float] | None = None) -> None:
+    def __init__(self, when: float | Sequence[float] | None = None, *settings: object) -> None:
         if isinstance(when, (int, float)) and not when > 0:
             raise InputError(f"{type(self).__name__}: the interval has to be positive, got {when} s")
         self.when = when
+        self._settings = settings
         self._times: list[float] = []
         self._recorded: list[float] = []
 
@@ -47,9 +52,35 @@ class Observer:
     def _due(self, time: float) -> bool:
         return self.when is None or any(isclose(time, t, rel_tol=1e-12, abs_tol=1e-12) for t in self._times)
 
+    def __repr__(self) -> str:
+        when = [] if self.when is None else [f"when={np.array(self.when).tolist()}"]
+        return f"{type(self).__name__}({', '.join([*map(repr, self._settings), *when])})"
+
+    def prepare(self, problem: Problem, begin: float, until: float) -> None:
+        """Called once before the first record, also of a resumed run; refuses what cannot be meant."""
+
     def start(self, problem: Problem, begin: float, until: float) -> None:
         """Called once, with the initial state."""
+        self.prepare(problem, begin, until)
         self._record_if_due(problem, begin)
+
+    def resume(self, problem: Problem, begin: float, until: float, memory: dict[str, NDArray]) -> None:
+        """Called instead of `start` in a run that began at `begin` and goes on from the present fields."""
+        self.prepare(problem, begin, until)
+        self._recorded = memory["time"].tolist()
+        self.remember(memory)
+
+    @property
+    def remembers(self) -> bool:
+        """Whether it takes part in checkpoints."""
+        return type(self).memory is not Observer.memory
+
+    def memory(self) -> dict[str, NDArray]:
+        """What its records are made of, beside `time`."""
+        return {}
+
+    def remember(self, memory: dict[str, NDArray]) -> None:
+        """Take back what `memory` gave."""
 
     def observe(self, problem: Problem, report: StepReport) -> None:
         """Called after every accepted step."""

@@ -57,12 +57,11 @@ class Coarseness(Observer):
         self._largest: dict[str, NDArray] = {}
         self._at: dict[str, NDArray] = {}
 
-    def start(self, problem: Problem, begin: float, until: float) -> None:
+    def prepare(self, problem: Problem, begin: float, until: float) -> None:
         if self._mesh not in (None, problem.mesh):
             raise InputError("Coarseness: it holds the cells of another mesh; take a new one for each mesh")
         self._mesh = problem.mesh
         self._recovery = Recovery(problem)
-        super().start(problem, begin, until)
 
     def record(self, problem: Problem, time: float) -> None:
         estimate = self._recovery.estimate()
@@ -73,6 +72,18 @@ class Coarseness(Observer):
             np.maximum(largest, error, out=largest)
             self._sizes[name] = max(self._sizes.get(name, 0.0), estimate.sizes[name])
             self._totals.setdefault(name, []).append(float(np.linalg.norm(error)))
+
+    def memory(self) -> dict[str, NDArray]:
+        kept: dict[str, dict] = {"size": self._sizes, "total": self._totals, "largest": self._largest, "at": self._at}
+        return {f"{what}/{name}": np.array(value) for what, of in kept.items() for name, value in of.items()}
+
+    def remember(self, memory: dict[str, NDArray]) -> None:
+        def of(what: str) -> dict[str, NDArray]:
+            return {key.split("/", 1)[1]: value for key, value in memory.items() if key.startswith(f"{what}/")}
+
+        self._sizes = {name: float(value) for name, value in of("size").items()}
+        self._totals = {name: value.tolist() for name, value in of("total").items()}
+        self._largest, self._at = of("largest"), of("at")
 
     def _relative(self) -> dict[str, NDArray]:
         if not self._largest:

@@ -29,7 +29,7 @@ class Ledger(Observer):
         self._held: dict[str, list[float]] = {}
         self._left: dict[tuple[str, str], list[float]] = {}
 
-    def start(self, problem: Problem, begin: float, until: float) -> None:
+    def prepare(self, problem: Problem, begin: float, until: float) -> None:
         self._vector = problem.fields.vec.CreateVector()
         self._vertices = {name: slice(r.start, r.start + problem.mesh.nv) for name, r in problem.ranges.items()}
         self._flows = BilinearForm(problem.space)
@@ -45,7 +45,6 @@ class Ledger(Observer):
                 self._nodes[name, bath.boundary] = problem.ranges[unknown].start + mine
         self._left = {key: [0.0] for key in self._nodes}
         self._contents = self._contents_at_nodes(problem)
-        super().start(problem, begin, until)
 
     def _contents_at_nodes(self, problem: Problem) -> dict[tuple[str, str], float]:
         problem.contents(self._vector)
@@ -75,6 +74,14 @@ class Ledger(Observer):
         for key, amount in gone.items():
             self._left[key].append(self._left[key][-1] + amount)
         super().observe(problem, report)
+
+    def memory(self) -> dict[str, NDArray]:
+        held = {f"held/{name}": np.array(values) for name, values in self._held.items()}
+        return held | {f"left/{name}/{boundary}": np.array(values) for (name, boundary), values in self._left.items()}
+
+    def remember(self, memory: dict[str, NDArray]) -> None:
+        self._held = {key.split("/", 1)[1]: list(values) for key, values in memory.items() if key.startswith("held/")}
+        self._left = {(name, boundary): list(memory[f"left/{name}/{boundary}"]) for name, boundary in self._nodes}
 
     @property
     def fluid(self) -> NDArray:

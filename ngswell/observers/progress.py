@@ -5,6 +5,8 @@ from __future__ import annotations
 import sys
 from time import perf_counter
 
+import numpy as np
+from numpy.typing import NDArray
 from tqdm import tqdm
 
 from ngswell.observers.base import Observer
@@ -16,12 +18,12 @@ class Progress(Observer):
     """A bar over the simulated time on a terminal; elsewhere one line when the run ends."""
 
     def __init__(self, label: str = "run") -> None:
-        super().__init__()
+        super().__init__(None, label)
         self.label = label
 
-    def start(self, problem: Problem, begin: float, until: float) -> None:
-        self._begin, self._clock, self._reports = begin, perf_counter(), 0
-        self._iterations = self._rejected = 0
+    def prepare(self, problem: Problem, begin: float, until: float) -> None:
+        self._begin, self._clock = begin, perf_counter()
+        self._reports = self._rejected = self._iterations = 0
         self._reached = begin
         self._bar = tqdm(
             total=until - begin,
@@ -38,6 +40,16 @@ class Progress(Observer):
         self._reached = report.time
         self._bar.set_postfix_str(f"step {report.dt:.3g} s, {report.iterations} iterations", refresh=False)
         self._bar.update(report.time - self._begin - self._bar.n)
+
+    def memory(self) -> dict[str, NDArray]:
+        counts = [self._reports, self._rejected, self._iterations, self._reached, perf_counter() - self._clock]
+        return {"counts": np.array(counts)}
+
+    def remember(self, memory: dict[str, NDArray]) -> None:
+        *counts, self._reached, seconds = memory["counts"].tolist()
+        self._reports, self._rejected, self._iterations = map(int, counts)
+        self._clock -= seconds
+        self._bar.update(self._reached - self._begin)
 
     def finish(self, problem: Problem) -> None:
         self._bar.close()

@@ -29,17 +29,16 @@ class Probe(Observer):
     """
 
     def __init__(self, point: Sequence[float], *quantities: str, when: float | Sequence[float] | None = None) -> None:
-        super().__init__(when)
+        super().__init__(when, tuple(point), *quantities)
         if not quantities:
             raise InputError("Probe: name at least one quantity, such as 'displacement'")
         self.point, self.quantities = tuple(point), quantities
         self._values: dict[str, list] = {name: [] for name in quantities}
 
-    def start(self, problem: Problem, begin: float, until: float) -> None:
+    def prepare(self, problem: Problem, begin: float, until: float) -> None:
         if len(self.point) != problem.mesh.dim or not problem.mesh.Contains(*self.point):
             raise InputError(f"Probe: {self.point} is not a point of the {problem.mesh.dim}-d body")
         self._fields = {name: _output(problem, name) for name in self.quantities}
-        super().start(problem, begin, until)
 
     def record(self, problem: Problem, time: float) -> None:
         point = problem.mesh(*self.point)
@@ -51,6 +50,12 @@ class Probe(Observer):
         """Records of each quantity: one row a time."""
         return {name: np.array(rows) for name, rows in self._values.items()}
 
+    def memory(self) -> dict[str, NDArray]:
+        return self.values
+
+    def remember(self, memory: dict[str, NDArray]) -> None:
+        self._values = {name: list(memory[name]) for name in self.quantities}
+
 
 class Integral(Observer):
     """Integral of a quantity over the deformed body, or over the deformed `boundary`; of 1 if no quantity is named."""
@@ -61,11 +66,11 @@ class Integral(Observer):
         boundary: str | None = None,
         when: float | Sequence[float] | None = None,
     ) -> None:
-        super().__init__(when)
+        super().__init__(when, quantity, boundary)
         self.quantity, self.boundary = quantity, boundary
         self._values: list = []
 
-    def start(self, problem: Problem, begin: float, until: float) -> None:
+    def prepare(self, problem: Problem, begin: float, until: float) -> None:
         quantity = CF(1.0) if self.quantity is None else _output(problem, self.quantity)
         weight = problem.kinematics.weight
         if self.boundary is None:
@@ -74,7 +79,6 @@ class Integral(Observer):
             problem.scene.check_boundary("Integral", self.boundary)
             cofactor = BoundaryFromVolumeCF(problem.state.cofactor)
             self._quantity, self._measure = quantity, Norm(cofactor * problem.kinematics.normal) * weight
-        super().start(problem, begin, until)
 
     def record(self, problem: Problem, time: float) -> None:
         mesh, order = problem.mesh, 2 * problem.model.order + 2
@@ -87,6 +91,12 @@ class Integral(Observer):
     def values(self) -> NDArray:
         """Records, one row a time; the quantity's unit times mm (1-d, or a boundary in 2-d), mm² or mm³."""
         return np.array(self._values)
+
+    def memory(self) -> dict[str, NDArray]:
+        return {"values": self.values}
+
+    def remember(self, memory: dict[str, NDArray]) -> None:
+        self._values = list(memory["values"])
 
 
 class Area(Integral):
@@ -105,3 +115,9 @@ class Snapshots(Observer):
 
     def record(self, problem: Problem, time: float) -> None:
         self.states.append(problem.snapshot(time))
+
+    def memory(self) -> dict[str, NDArray]:
+        return {"values": np.array([state.values for state in self.states])}
+
+    def remember(self, memory: dict[str, NDArray]) -> None:
+        self.states = [Snapshot(time, values) for time, values in zip(self._recorded, memory["values"], strict=True)]

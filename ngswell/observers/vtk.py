@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
+from glob import escape
 from pathlib import Path
+from xml.sax.saxutils import quoteattr
 
 from ngsolve import CF, CoefficientFunction, VTKOutput
+from numpy.typing import NDArray
 
 from ngswell.errors import InputError, OutputError
+from ngswell.files import check_folder, replacing
 from ngswell.observers.base import Observer
 from ngswell.problem import Problem
 
@@ -19,7 +22,8 @@ class VTK(Observer):
     All the model's quantities by default, or those named. Vectors have three components and stresses nine, as VTK readers
     expect. `subdivision` splits each element edge 2^n times, so that quadratic displacements show. Existing series are
     kept unless `overwrite`; then the old series is removed as a whole. Raises OutputError before any computing, and
-    InputError on a 1-d mesh.
+    InputError on a 1-d mesh. At every moment the .pvd names complete pieces only; a resumed run replaces those beyond its
+    checkpoint.
     """
 
     def __init__(
@@ -30,10 +34,10 @@ class VTK(Observer):
         subdivision: int = 1,
         overwrite: bool = False,
     ) -> None:
-        super().__init__(when)
+        super().__init__(when, str(path), *quantities)
         self.path, self.quantities, self.subdivision, self.overwrite = Path(path), quantities, subdivision, overwrite
 
-    def start(self, problem: Problem, begin: float, until: float) -> None:
+    def prepare(self, problem: Problem, begin: float, until: float) -> None:
         if problem.mesh.dim == 1:  # NGSolve's writer leaves coordinates and derivatives of 1-d meshes unset
             raise InputError("VTK: NGSolve writes no 1-d meshes; watch a column with Probe, or run it as a strip")
         outputs = problem.state.outputs()
@@ -43,33 +47,60 @@ class VTK(Observer):
         names = list(self.quantities or outputs)
         if "displacement" not in names:
             names.append("displacement")
-        self._prepare_folder()
-        self._writer = VTKOutput(
-            problem.mesh,
-            coefs=[_three_dimensional(outputs[name]) for name in names],
-            names=names,
-            filename=str(self.path),
-            subdivision=self.subdivision,
-        )
-        super().start(problem, begin, until)
+        check_folder(self.path.parent, "VTK")
+        self._fields = {name: _three_dimensional(outputs[name]) for name in names}
 
-    def _prepare_folder(self) -> None:
-        folder = self.path.parent
-        if not folder.is_dir():
-            raise OutputError(f"VTK: there is no folder {folder}; make it first")
-        if not os.access(folder, os.W_OK | os.X_OK):
-            raise OutputError(f"VTK: the folder {folder} cannot be written to")
-        series = self.path.with_name(self.path.name + ".pvd")
-        pieces = [*folder.glob(f"{self.path.name}.vtu"), *folder.glob(f"{self.path.name}_step*.vtu")]
-        if (series.exists() or pieces) and not self.overwrite:
-            raise OutputError(f"VTK: {series} exists; choose another name or pass overwrite=True")
-        for file in [series, *pieces]:
-            file.unlink(missing_ok=True)
+    def start(self, problem: Problem, begin: float, until: float) -> None:
+        self.prepare(problem, begin, until)
+        self._recorded = []
+        pieces = [self._piece(0), *self.path.parent.glob(f"{escape(self.path.name)}_step*.vtu")]
+        old = [file for file in [self._series, *pieces] if file.exists()]
+        if old and not self.overwrite:
+            raise OutputError(f"VTK: {self._series} exists; choose another name or pass overwrite=True")
+        for file in old:
+            file.unlink()
+        self._record_if_due(problem, begin)
+
+    def memory(self) -> dict[str, NDArray]:
+        return {}  # the pieces are on the disk
+
+    def remember(self, memory: dict[str, NDArray]) -> None:
+        for number in range(len(self._recorded)):
+            if not self._piece(number).is_file():
+                raise InputError(f"VTK: {self._piece(number)}, written before the checkpoint, is missing; put it back")
+        self._write_series()
+
+    @property
+    def _series(self) -> Path:
+        return self.path.with_name(self.path.name + ".pvd")
+
+    def _piece(self, number: int) -> Path:
+        return self.path.with_name(self.path.name + (f"_step{number:05d}" if number else "") + ".vtu")
 
     def record(self, problem: Problem, time: float) -> None:
-        written = Path(self._writer.Do(time=time) + ".vtu")
-        if not written.is_file() or written.stat().st_size == 0:
-            raise OutputError(f"VTK: {written} could not be written (disk full?)")
+        with replacing(self._piece(len(self._recorded) - 1), "VTK") as new:
+            fields, name = self._fields, str(new.with_suffix(""))
+            # A writer of its own for each piece: NGSolve's own numbering starts anew in a resumed run.
+            writer = VTKOutput(problem.mesh, list(fields.values()), list(fields), name, subdivision=self.subdivision)
+            writer.Do()
+            if not _complete(new):  # NGSolve does not say when the disk is full
+                raise OSError("it is cut short; is the disk full?")
+        self._write_series()
+
+    def _write_series(self) -> None:
+        entries = [
+            f'<DataSet timestep="{time!r}" file={quoteattr(self._piece(number).name)}/>'
+            for number, time in enumerate(self._recorded)
+        ]
+        lines = ['<?xml version="1.0"?>', '<VTKFile type="Collection" version="1.0">', "<Collection>", *entries]
+        with replacing(self._series, "VTK") as new:
+            new.write_text("\n".join([*lines, "</Collection>", "</VTKFile>", ""]), encoding="utf-8")
+
+
+def _complete(piece: Path) -> bool:
+    with open(piece, "rb") as file:
+        file.seek(max(0, piece.stat().st_size - 40))
+        return b"</VTKFile>" in file.read()
 
 
 def _three_dimensional(field: CoefficientFunction) -> CoefficientFunction:
