@@ -151,10 +151,10 @@ def from_occ(shape: Any, maxh: float, order: int = 1, quads: bool = False) -> Me
 def check_mesh(mesh: Mesh) -> None:
     """Refuse cells that are turned inside out or have no size, by number and place.
 
-    At the corners and at the integration points of degree 4 the determinant of the cell's mapping has to have the sign it has
-    in most cells of the same shape (which one depends on how the mesh generator numbers the corners), and the cell's
-    thickness, determinant over largest stretch to the power d − 1, has to be above round-off of the body's size. The
-    determinant of a straight quadrilateral is linear, so that its corners decide: their angles have to stay below 180°.
+    At the corners and the integration points of degree 4 the determinant of the cell's mapping has to have the sign it has
+    in most cells of the same shape (which one depends on how the mesh generator numbers the corners), and the thickness,
+    determinant over largest stretch to the power d − 1, has to be above round-off of the body's size. The determinant of a
+    straight quadrilateral is linear, so that its corners decide: their angles have to stay below 180°.
     """
     round_off = 1e-12 * float(np.ptp(mesh.ngmesh.Coordinates(), axis=0).max())
     for name, shape in _CELLS[mesh.dim].items():
