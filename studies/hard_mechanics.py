@@ -329,6 +329,8 @@ def beyond(quick: bool) -> list[Attempt]:
                     "equilibrate": {"steps": Fixed(1.0), "start": directly},
                 }
                 for way, options in ways.items():
+                    if quick and way == "huge steps":
+                        continue
                     found.append(
                         attempt(
                             f"no equilibrium, {load:.3g} N/mm²{case}",
