@@ -19,7 +19,7 @@ NONE_LEFT = 1e-10
 """A null vector is one whose product leaves in no row more than this share of what its largest entry could make there."""
 
 
-def parts(mesh: Mesh) -> list[NDArray]:
+def connected_parts(mesh: Mesh) -> list[NDArray]:
     """Numbers of the vertices of each part of a mesh that edges connect."""
     ends = np.array([[vertex.nr for vertex in edge.vertices] for edge in mesh.edges])
     label = np.arange(mesh.nv)

@@ -23,6 +23,9 @@ SMALLEST_SHARE = 1e-4
 STATIONARY = 1e30
 """A time step [s] beyond which contents do not change any more."""
 
+SHORTEST = 1e-12
+"""Relaxation gives up below this step [s]."""
+
 
 def equilibrate(
     scene: Scene,
@@ -33,9 +36,10 @@ def equilibrate(
     """The state in which the scene comes to rest when its charge and baths stay as they are at `time` [s] (its start).
 
     The stationary balances are solved by continuation: from the uncharged body, already loaded, the charge is raised as
-    fast as Newton's method follows. Works for fields of position and constrained bodies. Raises InputError for a
-    sealed body (what it holds is not determined by balances) and for treatments that remember the past, and StepError when
-    no more of the charge can be added.
+    fast as Newton's method follows. Where that ends early, as under a load that only the charged body can bear, the body
+    relaxes from its initial state instead, in steps of backward Euler that grow as fast as Newton's method follows. Works
+    for fields of position and constrained bodies. Raises InputError for a sealed body (what it holds is not determined by
+    balances) and for treatments that remember the past, and StepError when neither way reaches the state of rest.
     """
     time = scene.start if time is None else time
     if not scene.baths:
@@ -44,22 +48,25 @@ def equilibrate(
         if isinstance(scene.treatment(bath), (Lagged, Frozen)):
             raise InputError(f"equilibrate: the bath on {bath.boundary!r} remembers the past ({scene.treatment(bath)})")
     problem, method = scene.problem, newton or Newton()
-    problem.initialise(charge_share=0.0)
     solver = make_solver(problem)
+    failure = _raise_charge(problem, time, method, solver)
+    if failure and _relax(problem, time, method, solver):
+        raise failure
+    problem.set_time(time)
+    return problem.snapshot(time)
+
+
+def _raise_charge(problem: Problem, time: float, newton: Newton, solver: LinearSolver) -> StepError | None:
+    """Continuation from the uncharged body; the fields hold the state of rest unless there is something to raise."""
+    problem.initialise(charge_share=0.0)
 
     def solve(share: float, guess: NDArray) -> Outcome:
         problem.begin_step(time, STATIONARY, guess, charge_share=share)
-        return method.solve(problem, solver)
-
-    def give_up(share: float, outcome: Outcome) -> StepError:
-        found, reason, remedy = singular_mode(problem), outcome.reason, outcome.remedy
-        if found:
-            reason, remedy = f"the linear system is singular: {found}", UNDETERMINED
-        return StepError(time, STATIONARY, outcome.field, outcome.where, f"at {share:.3g} of the charge, {reason}", remedy)
+        return newton.solve(problem, solver)
 
     outcome = solve(0.0, problem.vector.copy())
     if outcome.reason is not None:
-        raise give_up(0.0, outcome)
+        return _give_up(problem, time, 0.0, outcome)
     step, reached = 1.0, [(0.0, problem.vector.copy())]
     while reached[-1][0] < 1.0:
         share, state = reached[-1]
@@ -76,6 +83,30 @@ def equilibrate(
         problem.vector[:] = state
         step /= 4
         if step < SMALLEST_SHARE:
-            raise give_up(share, outcome)
-    problem.set_time(time)
-    return problem.snapshot(time)
+            return _give_up(problem, time, share, outcome)
+    return None
+
+
+def _relax(problem: Problem, time: float, newton: Newton, solver: LinearSolver) -> bool:
+    """From the initial state to rest under what holds at `time`; whether it gives up."""
+    problem.initialise()
+    step, state = STATIONARY, problem.vector.copy()
+    started = False
+    while step >= SHORTEST:
+        problem.begin_step(time, step)
+        if newton.solve(problem, solver).reason is None:
+            if step == STATIONARY:
+                return False
+            started, state = True, problem.vector.copy()
+            step = min(10 * step, STATIONARY)
+        else:
+            problem.vector[:] = state
+            step /= 20 if started else 1e3  # 20 undoes the last growth and halves
+    return True
+
+
+def _give_up(problem: Problem, time: float, share: float, outcome: Outcome) -> StepError:
+    found, reason, remedy = singular_mode(problem), outcome.reason, outcome.remedy
+    if found:
+        reason, remedy = f"the linear system is singular: {found}", UNDETERMINED
+    return StepError(time, STATIONARY, outcome.field, outcome.where, f"at {share:.3g} of the charge, {reason}", remedy)

@@ -24,6 +24,18 @@ _CELLS = {
 }
 
 
+_CORNERS: dict[Any, list[tuple[int, ...]]] = {
+    ET.SEGM: [(0,), (1,)],
+    ET.TRIG: [(0, 0), (1, 0), (0, 1)],
+    ET.QUAD: [(0, 0), (1, 0), (1, 1), (0, 1)],
+    ET.TET: [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)],
+    ET.HEX: [(x, y, z) for z in (0, 1) for y in (0, 1) for x in (0, 1)],
+    ET.PRISM: [(x, y, z) for z in (0, 1) for x, y in ((0, 0), (1, 0), (0, 1))],
+    ET.PYRAMID: [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)],  # at the apex the mapping is singular
+}
+"""Corners of the reference cells."""
+
+
 def column(height: float, cells: int, grade: Grade | None = None) -> Mesh:
     """A segment of `height` [mm] with boundaries "bottom" (x = 0) and "top".
 
@@ -139,13 +151,16 @@ def from_occ(shape: Any, maxh: float, order: int = 1, quads: bool = False) -> Me
 def check_mesh(mesh: Mesh) -> None:
     """Refuse cells that are turned inside out or have no size, by number and place.
 
-    At the integration points of degree 4 the determinant of the cell's mapping has to have the sign it has in most cells of
-    the same shape (which one depends on how the mesh generator numbers the corners), and the cell's thickness, determinant
-    over largest stretch to the power d − 1, has to be above round-off of the body's size.
+    At the corners and the integration points of degree 4 the determinant of the cell's mapping has to have the sign it has
+    in most cells of the same shape (which one depends on how the mesh generator numbers the corners), and the thickness,
+    determinant over largest stretch to the power d − 1, has to be above round-off of the body's size. The determinant of a
+    straight quadrilateral is linear, so that its corners decide: their angles have to stay below 180°.
     """
     round_off = 1e-12 * float(np.ptp(mesh.ngmesh.Coordinates(), axis=0).max())
     for name, shape in _CELLS[mesh.dim].items():
-        where = mesh.MapToAllElements({shape: IntegrationRule(shape, 4)}, VOL)
+        inside, corners = IntegrationRule(shape, 4), _CORNERS[shape]
+        rule = IntegrationRule([*corners, *inside.points], [0.0] * (len(corners) + len(inside)))
+        where = mesh.MapToAllElements({shape: rule}, VOL)
         if not len(where):
             continue
         mapping = specialcf.JacobianMatrix(mesh.dim)(where).reshape(-1, mesh.dim, mesh.dim)
@@ -154,11 +169,14 @@ def check_mesh(mesh: Mesh) -> None:
         thickness = np.sign(np.median(det)) * det / np.maximum(stretch, round_off) ** (mesh.dim - 1)
         bad = np.unique(where["nr"][~(thickness > round_off)])
         if len(bad):
-            inverted = thickness[where["nr"] == bad[0]].min() < -round_off
-            corners = [mesh[vertex].point for vertex in mesh[ElementId(VOL, int(bad[0]))].vertices]
-            place = ", ".join(f"{x:.4g}" for x in np.mean(corners, axis=0))
+            found = thickness[where["nr"] == bad[0]]
+            fault = "is turned inside out" if found.min() < -round_off else "has no size"
+            if (found[len(corners) :] > round_off).all():
+                fault = "has a corner of 180° or more"
+            vertices = [mesh[vertex].point for vertex in mesh[ElementId(VOL, int(bad[0]))].vertices]
+            place = ", ".join(f"{x:.4g}" for x in np.mean(vertices, axis=0))
             raise InputError(
-                f"mesh: cell {bad[0]}, a {name} near ({place}) mm, {'is turned inside out' if inverted else 'has no size'}"
+                f"mesh: cell {bad[0]}, a {name} near ({place}) mm, {fault}"
                 f"{f', as {len(bad) - 1} more' if len(bad) > 1 else ''}: move its corners, or mesh the body again"
             )
 

@@ -11,6 +11,9 @@ from ngsolve import BaseVector
 from ngswell.problem import Problem
 from ngswell.solvers import LinearSolver
 
+SHORTEST = 1e-12
+"""Share of a correction below which keeping the fields admissible leaves none of it."""
+
 
 @dataclass(frozen=True)
 class Outcome:
@@ -39,10 +42,10 @@ class Newton:
     """Damped Newton iteration, with new or old matrices.
 
     A field has converged when the last correction's largest coefficient is below `tolerance` times the field's reference
-    size (`Problem.references`); all fields have to. Steps are halved until the fields are admissible and the simplified
-    correction (old matrix, new residual) is smaller than the correction: the natural monotonicity test, which
-    does not depend on units or on how equations are scaled. The simplified correction that passes the
-    test of convergence is applied as well, so accepted states are about a factor `tolerance` better than tested.
+    size (`Problem.references`); all fields have to. Steps are halved until the fields are admissible, and from there at most
+    to `least_damping` until the simplified correction (old matrix, new residual) is smaller than the correction: the natural
+    monotonicity test, which does not depend on units or on how equations are scaled. The simplified correction that passes
+    the test of convergence is applied as well, so accepted states are about a factor `tolerance` better than tested.
 
     A factorisation is kept, over iterations, stages and steps, as long as each correction is at most `slowest` times the one
     before; the error that is left is then estimated as that of a geometric series. With 0, each iteration has its own.
@@ -93,6 +96,7 @@ class Newton:
             return Outcome(0, f"the step starts with {found[0]} not positive", found[0], found[1], SQUEEZED)
         problem.residual(residual)
         renew = not self._may_keep(solver)
+        beyond: tuple[str, tuple[float, ...]] | None = None  # what the last correction would leave the physical range with
         known = False  # whether `correction` answers the present residual
         for count in range(1, self.most_iterations + 1):
             if renew and not solver.renew(problem):
@@ -101,11 +105,13 @@ class Newton:
                 return failure(count, "the linear system is singular or not finite")
             before = size(correction)
             start = vector.copy()
-            damping, rate = 1.0, inf
+            damping, rate, least = 1.0, inf, SHORTEST
             while True:
                 vector[:] = start - damping * correction.FV().NumPy()
                 refused = problem.inadmissible()
+                beyond = refused or (beyond if damping < 1.0 else None)
                 if refused is None:
+                    least = max(least, self.least_damping * damping)
                     if damping == 1.0 and (before if renew else left(before)) <= self.tolerance:
                         return success(count)
                     problem.residual(residual)
@@ -116,10 +122,10 @@ class Newton:
                 if not renew:
                     break
                 damping /= 2
-                if damping < self.least_damping:
+                if damping < least:
                     vector[:] = start
-                    if refused:
-                        return Outcome(count, f"{refused[0]} would not stay positive", refused[0], refused[1], SQUEEZED)
+                    if beyond:
+                        return Outcome(count, f"{beyond[0]} would not stay positive", beyond[0], beyond[1], SQUEEZED)
                     return failure(count, "Newton's method stalls: no damped step reduces the correction")
             if not renew and (refused or not rate < 1):
                 vector[:] = start
@@ -128,11 +134,16 @@ class Newton:
                 continue
             solver.contraction = max(rate, solver.contraction or 0.0)
             if damping == 1.0 and left(size(simplified)) <= self.tolerance:
+                converged = vector.copy()
                 vector -= simplified.FV().NumPy()
+                if problem.inadmissible():  # at the edge of the physical range even what is left may be too much
+                    vector[:] = converged
                 return success(count)
             known = damping == 1.0 and self._may_keep(solver)
             renew = not known
             correction.data = simplified
+        if beyond:
+            return Outcome(count, f"{beyond[0]} would not stay positive", beyond[0], beyond[1])
         return failure(self.most_iterations, f"Newton's method needs more than {self.most_iterations} iterations")
 
     def _may_keep(self, solver: LinearSolver) -> bool:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from ngswell.baths import Bath, Lagged, Multiplier, Treatment, Weak
-from ngswell.diagnosis import cannot_change_volume, free_motion, parts
+from ngswell.diagnosis import cannot_change_volume, connected_parts, free_motion
 from ngswell.equilibrium import equilibrate
 from ngswell.errors import InputError
 from ngswell.kinematics import Kinematics
@@ -170,7 +170,7 @@ class Scene:
 
     def _check_parts(self) -> None:
         """Refuse parts of the body that are free to translate or rotate, or whose pressure has no level."""
-        places, held, bodies = vertices(self.mesh), self.held(), parts(self.mesh)
+        places, held, bodies = vertices(self.mesh), self.held(), connected_parts(self.mesh)
         self._check_separate(places, bodies)
         fixed = {
             (number, axis)

@@ -25,7 +25,7 @@ from ngswell import (
     from_occ,
     rectangle,
 )
-from ngswell.diagnosis import parts, singular_mode
+from ngswell.diagnosis import connected_parts, singular_mode
 
 NO_CHARGE = Material(mu=0.24, lam=0.02, nS0=0.25, cfc0=0.0, D_plus=5e-4, D_minus=8e-4, K=1e-3)
 MODELS = {
@@ -63,7 +63,7 @@ def gel(mesh, supports, baths):
 
 def test_a_part_that_nothing_holds_is_named():
     mesh = two_squares(0.5)
-    assert sorted(len(part) for part in parts(mesh)) == [9, 9]
+    assert sorted(len(part) for part in connected_parts(mesh)) == [9, 9]
     baths = [Bath("bottom|top", c=0.15)]
     with pytest.raises(InputError, match=r"part near \(0.5, 1.\d+\) mm, one of 2 not connected, can rotate"):
         gel(mesh, [Roller("bottom", "xy")], baths)
@@ -99,7 +99,7 @@ def test_other_motions_without_change_of_volume_are_refused():
         confined_column(baths=[], loads=[], supports=[Roller("bottom|top", "x")], initial=(0.15, 0.0))
     with pytest.raises(InputError, match="level"):
         sealed("Uncharged", kinematics=Axisymmetric(), supports=[Roller("left|right", "r"), Roller("bottom|top", "z")])
-    assert column(1.0, 3).nv == len(parts(column(1.0, 3))[0])
+    assert column(1.0, 3).nv == len(connected_parts(column(1.0, 3))[0])
 
 
 @pytest.mark.parametrize(

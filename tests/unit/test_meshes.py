@@ -439,6 +439,8 @@ def moved(mesh, number, place):
         (lambda: column(1.0, 4), 1, (0.9,), r"cell 1, a segment near \(0.7\) mm, is turned inside out"),
         (lambda: column(1.0, 4), 1, (0.0,), r"cell 0, a segment near \(0\) mm, has no size"),
         (lambda: rectangle(1.0, 1.0, 3, 3), 5, (0.9, 0.9), "cell .*, a quadrilateral near .* turned inside out"),
+        # The corner at (0.77, 0.77) has more than 180°; all integration points of the forms still lie in the sound part.
+        (lambda: rectangle(1.0, 1.0, 2, 2), 4, (0.77, 0.77), "a quadrilateral near .* has a corner of 180° or more: move"),
         (lambda: rectangle(1.0, 1.0, 3, 3, triangles=True), 5, (0.9, 0.9), "a triangle near .* turned inside out"),
         (lambda: rectangle(1.0, 1.0, 1, 1, triangles=True), 3, (0.5, 0.5), "cell 1, a triangle near .* no size"),
         (lambda: box(1.0, 1.0, 1.0, 2, 2, 2), 13, (1.4, 1.4, 1.4), "a hexahedron near .* turned inside out, as 6 more"),

@@ -1,11 +1,14 @@
 """The state of rest reached directly, against closed forms and against the ramped transient."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from conftest import P0, strip
 from ngsolve import x, y
 
 from ngswell import (
+    TABLE_1,
     TABLE_2,
     Adaptive,
     Area,
@@ -93,8 +96,21 @@ def test_refusals():
         block(baths=[], initial=(1.0, 0.0)).equilibrate()
     with pytest.raises(InputError, match="remembers the past"):
         strip(Lagged()).equilibrate()
-    with pytest.raises(StepError, match="of the charge"):
-        strip(loads=[Traction("top", (0.0, -900.0))]).equilibrate()
+    # Without charge and λ nothing but µ (1 − nS0²)/nS0 = 0.9 N/mm² resists up to the compression point.
+    soft = replace(TABLE_1, cfc0=0.0, lam=0.0)
+    with pytest.raises(StepError, match="at 0 of the charge, fluid content J − nS0 would not stay positive"):
+        strip(material=soft, loads=[Traction("top", (0.0, -0.91))]).equilibrate()
+
+
+def test_a_load_that_only_the_charged_body_bears():
+    # Without charge the body collapses, which is where continuation in the charge would start.
+    material = replace(TABLE_1, lam=0.0)
+    for load in (5.0, 900.0):
+        scene = strip(material=material, loads=[Traction("top", (0.0, -load))])
+        scene.equilibrate()
+        J = scene.problem.state.J(scene.mesh(0.01, 0.4))
+        content = homogeneous_equilibrium(material, 0.15, "confined", load=load).J - material.nS0
+        assert J - material.nS0 == pytest.approx(content, rel=1e-8)  # homogeneous: exact to Newton's tolerance
 
 
 def test_penalty_hardly_matters_at_rest():
