@@ -9,11 +9,11 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from math import pi, sqrt
+from math import pi
 from typing import Any
 
 import numpy as np
-from ngsolve import CF, CoefficientFunction, IfPos, x, y
+from ngsolve import CF, IfPos, Mesh, x, y
 from numpy.typing import NDArray
 
 from ngswell import (
@@ -26,11 +26,9 @@ from ngswell import (
     Fixed,
     Ledger,
     Material,
-    Multiplier,
     Newton,
     Penalty,
     PlaneStrain,
-    Potential,
     Probe,
     Ramp,
     Result,
@@ -49,7 +47,7 @@ from ngswell.models import Model
 from ngswell.observers import Observer
 from ngswell.problem import Problem, Snapshot
 from ngswell.quadrature import vertices
-from ngswell.schemes import ESDIRK4
+from ngswell.schemes import BACKWARD_EULER, ESDIRK4, Scheme
 from ngswell.stepping import Control
 from studies.hard import CHOICES, DEFAULTS, Attempt, attempt
 
@@ -82,17 +80,13 @@ def column_scene(
 
 def strip_scene(model: Model, treatment: Treatment, c: Any, cells: int, **changes: Any) -> Scene:
     """The column as a strip of one cell across."""
-    return column_scene(
-        model,
-        treatment,
-        c,
-        cells,
-        mesh=rectangle(HEIGHT / cells, HEIGHT, 1, cells),
-        kinematics=PlaneStrain(),
-        supports=[Roller("bottom", "y"), Roller("left|right", "x")],
-        loads=[Traction("top", (0.0, -P0))],
-        **changes,
-    )
+    plane = {
+        "mesh": rectangle(HEIGHT / cells, HEIGHT, 1, cells),
+        "kinematics": PlaneStrain(),
+        "supports": [Roller("bottom", "y"), Roller("left|right", "x")],
+        "loads": [Traction("top", (0.0, -P0))],
+    }
+    return column_scene(model, treatment, c, cells, **{**plane, **changes})
 
 
 def block_scene(model: Model, treatment: Treatment, c: Any, cells: int) -> Scene:
@@ -131,7 +125,7 @@ def distance(forms: Mapping[str, Callable[..., float]], count: int, scene: Scene
     )
     places = low + shares * (high - low)
     outputs = scene.problem.state.outputs()
-    found = [abs(outputs[name](scene.mesh(*at)) / form(at) - 1) for name, form in forms.items() for at in places]
+    found = [abs(outputs[name](scene.mesh(*at)) / form(*at) - 1) for name, form in forms.items() for at in places]
     return float(np.max(found))
 
 
@@ -185,7 +179,7 @@ def bath_range(quick: bool) -> list[Attempt]:
                         partial(scene_of, model, treatment, bath),
                         until,
                         "J",
-                        partial(distance, {"J": lambda at, J=J: J}, 4),
+                        partial(distance, {"J": lambda *at, J=J: J}, 4),
                         1e-8 if body == "column" else 1e-7,
                         Adaptive(1e-2),
                         start=partial(at_rest, before, motion, load),
@@ -273,9 +267,15 @@ def sudden_run(
     return attempt(title, name, make, until, measure, error, bound, control, [nodes], newton=ACCURATE)
 
 
-def allowed(step: float) -> float:
+def allowed(step: float, scheme: Scheme = BACKWARD_EULER) -> float:
     """Bound of what c₊ may leave the interval between its old and new value by, in shares of the jump."""
-    return 1.05 * max(0.0, -float(alternating(step, "c_plus").min())) + 1e-3
+    overshoot = 0.0
+    if scheme is not BACKWARD_EULER:
+        rows = np.array([[*row, *(0.0,) * (len(scheme.rows) - len(row))] for row in scheme.rows])
+        jump = np.array([0.0, *(1.0,) * (len(rows) - 1)])  # the first stage is the old state, before the jump
+        z = np.logspace(-2, 6, 400)
+        overshoot = max(np.linalg.solve(np.eye(len(rows)) + share * rows, share * rows @ jump)[-1] for share in z) - 1
+    return 1.05 * max(0.0, -float(alternating(scheme.diagonal * step, "c_plus").min())) + overshoot + 1e-3
 
 
 def sudden_steps(quick: bool) -> list[Attempt]:
@@ -286,7 +286,8 @@ def sudden_steps(quick: bool) -> list[Attempt]:
       act in series with the first cell, nor Nitsche's terms, which meet the jump within it.
     - "c₊ outside": 0.15 to 0.125 mol/l, 20 steps; how far c₊ leaves the interval between old and new value, in which the
       exact solution stays (p does not: negative osmosis). Bounded by `alternating`, with 5 % of it and 1e-3 of the jump for
-      κ changing with the bath; ESDIRK4(3) solves stages of a quarter of the step. Graded cells have h² < 6 κ Δt at the bath.
+      κ changing with the bath. ESDIRK4(3) solves stages of a quarter of the step, and answers a jump of z = −rate Δt with
+      1.0102 at most, at z = −6.8. Graded cells have h² < 6 κ Δt at the bath.
     - "J": 20 steps of 1e4 s and more, the closed form at rest; (1 + 5e-3 Δt)⁻²⁰ is below round-off.
     """
     change = DILUTED - BATH
@@ -304,7 +305,7 @@ def sudden_steps(quick: bool) -> list[Attempt]:
             scheme = Fixed(step, ESDIRK4)
             found.append(
                 sudden_run(
-                    f"steps of {step:g} s, ESDIRK4(3)", name, "c₊ outside", change, scheme, 20 * step, allowed(step / 4)
+                    f"steps of {step:g} s, ESDIRK4(3)", name, "c₊ outside", change, scheme, 20 * step, allowed(step, ESDIRK4)
                 )
             )
             if not quick:
@@ -341,3 +342,376 @@ def alternation(quick: bool = False) -> dict[str, NDArray]:
     kappa = diffusivities(linear.storage, linear.conductance)[0][0]
     closed = [alternating(step, "c_plus").min() for step in steps]
     return {"steps": steps, "r": kappa * steps * (CELLS / HEIGHT) ** 2, "found": np.array(found), "closed": np.array(closed)}
+
+
+# -- charge --------------------------------------------------------------------------------------------------------------
+
+UNCHARGED = replace(TABLE_1, cfc0=0.0)
+CHARGED = replace(TABLE_1, cfc0=2.0)
+
+
+def salt_series(places: NDArray, step: float, count: int, before: float, after: float) -> NDArray:
+    """Salt [mol/l] at `places` above the sealed bottom, after `count` steps of backward Euler from a change of the bath.
+
+    Fick's law with the ambipolar D = 2 D₊ D₋/(D₊ + D₋), whatever the porosity: modes cos(αx), α = (n + ½) π/h.
+    """
+    m = TABLE_1
+    D = 2 * m.number("D_plus") * m.number("D_minus") / (m.number("D_plus") + m.number("D_minus"))
+    n = np.arange(2000)
+    wave = (n + 0.5) * pi / HEIGHT
+    left = 2 * (-1.0) ** n / (wave * HEIGHT) * np.exp(-count * np.log1p(D * wave**2 * step))
+    return after + (before - after) * np.cos(np.outer(places, wave)) @ left
+
+
+def local_rest(charge: Callable[[float], float], bath: float, load: float, at: float) -> float:
+    """J of a confined column at rest where its charge [mol/l] is charge(at)."""
+    return homogeneous_equilibrium(replace(TABLE_1, cfc0=charge(at)), bath, "confined", load=load).J
+
+
+def charge(quick: bool) -> list[Attempt]:
+    """No charge, a charge of 2 mol/l, and charges that fall to zero along the column.
+
+    - none: salt diffuses by Fick, nothing deforms. J − 1 is round-off. Salt against its Fourier series in the same steps,
+      cubic u and quadratic salt on 20 cells: 2e-6 of the bath; a penalty of 1e4 D₊/h adds 5e-6 of the column's resistance.
+    - 2 mol/l: rest by the closed form, from the loaded reference state to a bath of 0.01 mol/l at once, and unloaded with
+      the charge raised. New charge comes with no cations but at the cost of anions: raised in 1e3 s, faster than salt
+      diffuses in (400 s for the column, at a hundredth of the charge), they run out. 1e7 s leave nothing of the transient.
+    - varying: at rest each point of a confined column obeys the closed form for its own charge. Between the nodes J is
+      linear in a cell, and no better than the interpolant of the closed form: twice its error, h²/8 max |J″|, is the bound.
+    """
+    holding = donnan.pressure(BATH, 2.0, CHARGED.RT)
+    loaded = homogeneous_equilibrium(CHARGED, 0.01, "confined", load=holding).J
+    swollen = homogeneous_equilibrium(CHARGED, BATH, "confined").J
+    found = []
+
+    def strong(title: str, name: str, J: float, bath: float, **scene: Any) -> None:
+        make = partial(column_scene, *CHOICES[name], bath, 10, CHARGED, **scene)
+        error = partial(distance, {"J": lambda *at: J}, 4)
+        found.append(attempt(title, name, make, 1e7, "J", error, 1e-8, Adaptive(1e-2), newton=ACCURATE))
+
+    for name in CHOICES:
+        found += [fick(name, measure) for measure in ("J", "c₊")]
+        strong(f"2 mol/l, loaded, {BATH:g} → 0.01 mol/l at once", name, loaded, 0.01, loads=[Traction("top", (-holding,))])
+        for within in (1e5,) if quick else (1e5, 1e3):
+            raised = Ramp((0.0, 0.0), (within, 1.0))
+            strong(f"2 mol/l, unloaded, raised in {within:g} s", name, swollen, BATH, loads=(), charge=raised)
+        for end in ("bath", "bottom"):
+            found += [varying(name, end, "1-d", cells) for cells in ((20,) if quick else (20, 40))]
+            if name in DEFAULTS:
+                found.append(varying(name, end, "2-d", 20))
+    return found
+
+
+def fick(name: str, measure: str) -> Attempt:
+    """Salt enters an uncharged column, 0.15 → 5 mol/l at once."""
+    model, treatment = CHOICES[name]
+    places, after, count = np.array([0.01, 0.1, 0.26, 0.4]), 5.0, 20
+    series = salt_series(places, 5.0, count, BATH, after)
+
+    def error(scene: Scene, result: Result) -> float:
+        output, values = ("J", 1.0) if measure == "J" else ("c_plus", series)
+        field = scene.problem.state.outputs()[output]
+        return float(np.abs(np.array([field(scene.mesh(at)) for at in places]) / values - 1).max())
+
+    return attempt(
+        f"no charge, {BATH:g} → {after:g} mol/l at once",
+        name,
+        partial(column_scene, replace(model, order=3), treatment, after, 20, UNCHARGED, loads=()),
+        5.0 * count,
+        measure,
+        error,
+        1e-12 if measure == "J" else 2e-5,
+        Fixed(5.0),
+        newton=ACCURATE,
+    )
+
+
+def varying(name: str, end: str, where: str, cells: int) -> Attempt:
+    """A charge of 0.2 mol/l that falls linearly to zero at one end, in 0.05 mol/l, at rest."""
+    bath, load = 0.05, 0.05
+    scene_of, field, traction = (column_scene, x, (-load,)) if where == "1-d" else (strip_scene, y, (0.0, -load))
+
+    def charge_at(at: Any) -> Any:
+        return 0.2 * (1 - at / HEIGHT if end == "bath" else at / HEIGHT)
+
+    def rest(*at: float) -> float:
+        local = replace(TABLE_1, cfc0=float(charge_at(at[-1])))
+        return homogeneous_equilibrium(local, bath, "confined", load=load).J
+
+    fine = np.linspace(0.0, HEIGHT, 101)
+    values = np.array([rest(at) for at in fine])
+    curvature = float(np.abs(np.diff(values, 2)).max()) / (fine[1] - fine[0]) ** 2
+    material = replace(TABLE_1, cfc0=charge_at(field))
+    return attempt(
+        f"charge falls to zero at the {end}, {where}, {cells} cells",
+        name,
+        partial(scene_of, *CHOICES[name], bath, cells, material=material, loads=[Traction("top", traction)]),
+        1e6,
+        "J",
+        partial(distance, {"J": rest}, 23),
+        2 * curvature * (HEIGHT / cells) ** 2 / 8 / float(values.min()),
+        Adaptive(1e-2),
+        newton=ACCURATE,
+    )
+
+
+# -- the linear column, spectrally ---------------------------------------------------------------------------------------
+
+
+def legendre(degree: int) -> tuple[NDArray, NDArray, NDArray]:
+    """Nodes, weights and differentiation matrix of Gauss–Lobatto–Legendre interpolation on [−1, 1]."""
+    series = np.polynomial.legendre.Legendre.basis(degree)
+    nodes = np.concatenate([[-1.0], np.sort(series.deriv().roots().real), [1.0]])
+    values = series(nodes)
+    weights = 2 / (degree * (degree + 1) * values**2)
+    gaps = nodes[:, None] - nodes + np.eye(degree + 1)
+    slopes = values[:, None] / values / gaps
+    np.fill_diagonal(slopes, 0.0)
+    slopes[0, 0], slopes[-1, -1] = -degree * (degree + 1) / 4, degree * (degree + 1) / 4
+    return nodes, weights, slopes
+
+
+def linear_column(
+    layers: Sequence[tuple[float, NDArray]], step: float, count: int, efflux: NDArray | None = None
+) -> NDArray:
+    """Displacement of the top after 1, 2, … `count` steps of backward Euler, per small sudden change of the bath [mm per mol/l].
+
+    C ∂w/∂t = ∂(L ∂w)/∂x of `ngswell.linear`, on layers (thickness [mm], L) from the sealed bottom up; at the top w is the
+    bath's, or −L ∂w = efflux (w − the bath's). Spectral elements of degree 12, each layer in pieces thinned by four towards
+    its ends down to sqrt(κ Δt): 1e-8 against the closed form of `LinearColumn`.
+    """
+    C, jump = storage(TABLE_1, BATH), potentials(TABLE_1, BATH, salt=1.0)
+    pieces = []
+    for h, L in layers:
+        reach = np.sqrt(diffusivities(C, L)[0][0] * step)
+        levels = max(0, int(np.ceil(np.log(h / reach) / np.log(4))))
+        thin = 0.5 * 4.0 ** np.arange(1 - levels, 1)
+        shares = np.unique(np.concatenate([[0.0, 1.0], thin, 1 - thin]))
+        pieces += [(h * part, L) for part in np.diff(shares)]
+    nodes, weights, slopes = legendre(12)
+    size = 12 * len(pieces) + 1
+    mass, stiff = np.zeros((size, 2, size, 2)), np.zeros((size, 2, size, 2))
+    strain = np.zeros((size, 2))
+    for number, (h, L) in enumerate(pieces):
+        mine = slice(12 * number, 12 * number + 13)
+        mass[mine, :, mine] += np.einsum("ij,kl->ikjl", np.diag(weights * h / 2), C)
+        stiff[mine, :, mine] += np.einsum("ij,kl->ikjl", slopes.T @ np.diag(weights) @ slopes * 2 / h, L)
+        strain[mine] += np.outer(weights * h / 2, C[0])
+    mass, stiff = mass.reshape(2 * size, -1) / step, stiff.reshape(2 * size, -1)
+    top = slice(2 * size - 2, 2 * size)
+    forcing = np.zeros(2 * size)
+    system = mass + stiff
+    if efflux is None:
+        system[top], mass[top], forcing[top] = np.eye(2 * size)[top], 0.0, jump
+    else:
+        system[top, top] += efflux
+        forcing[top] = efflux @ jump
+    w, found = np.zeros(2 * size), []
+    inverse = np.linalg.inv(system)
+    for _ in range(count):
+        w = inverse @ (mass @ w + forcing)
+        found.append(float(strain.ravel() @ w))
+    return np.array(found)
+
+
+SMALL = -1e-6
+"""A change of the bath [mol/l] whose square, 1e-6 to 1e-5 of the response, is far below the errors of the meshes."""
+
+COUNT = 20
+"""Steps of one size in which linear columns are followed."""
+
+
+def followed(
+    title: str,
+    name: str,
+    reference: NDArray,
+    step: float,
+    bound: float,
+    mesh: Mesh,
+    material: Material = TABLE_1,
+    treatment: Treatment | None = None,
+) -> Attempt:
+    """The top's displacement after a small change of the bath, over steps of one size, against its linear `reference`."""
+    model, usual = CHOICES[name]
+    top = Probe((HEIGHT,), "displacement")
+
+    def error(scene: Scene, result: Result) -> float:
+        found = top.values["displacement"].ravel()[1:] / SMALL
+        return float(np.abs(found - reference).max() / np.abs(reference).max())
+
+    make = partial(column_scene, model, treatment or usual, BATH + SMALL, 1, material, mesh=mesh)
+    measure = "displacement"
+    return attempt(title, name, make, step * COUNT, measure, error, bound, Fixed(step), [top], newton=ACCURATE)
+
+
+def rested(
+    title: str, name: str, until: float, material: Material, cells: int, treatment: Treatment | None = None
+) -> Attempt:
+    """J at rest in 0.0125 mol/l, changed at once: it depends on neither permeability, diffusivities nor penalty."""
+    model, usual = CHOICES[name]
+    J = homogeneous_equilibrium(TABLE_1, 0.0125, "confined", load=P0).J
+    make = partial(column_scene, model, treatment or usual, 0.0125, cells, material)
+    error = partial(distance, {"J": lambda *at: J}, 4)
+    return attempt(title, name, make, until, "J at rest", error, 1e-6, Adaptive(1e-2), newton=ACCURATE)
+
+
+# -- contrasts -----------------------------------------------------------------------------------------------------------
+
+TIGHT = 1e-4
+"""Permeability and diffusivities of a layer over those of the other."""
+
+SCALED = {"K": ("K",), "D": ("D_plus", "D_minus"), "K and D": ("K", "D_plus", "D_minus")}
+
+
+def layered(of: str, tight_at: str) -> tuple[Material, list[tuple[float, NDArray]]]:
+    """Table 1 with half of the column tight, and the halves (thickness, conductance) from the bottom up."""
+    tight = replace(TABLE_1, **{name: TIGHT * TABLE_1.number(name) for name in SCALED[of]})
+    lower, upper = (TABLE_1, tight) if tight_at == "bath" else (tight, TABLE_1)
+    fields = {name: IfPos(x - HEIGHT / 2, upper.number(name), lower.number(name)) for name in SCALED[of]}
+    return replace(TABLE_1, **fields), [(HEIGHT / 2, conductance(m, BATH)) for m in (lower, upper)]
+
+
+def both_ends(cells: int) -> Mesh:
+    """Cells thinned a thousand times towards both ends, with a node in the middle."""
+    return column(HEIGHT, cells, grade={"bottom": 1e3, "top": 1e3})
+
+
+def contrasts(quick: bool) -> list[Attempt]:
+    """Permeability and diffusivities that jump by 1e4 in the middle, or differ by decades everywhere.
+
+    The displacement of the top after a small change of the bath, in the same time steps as `linear_column`: what is left is
+    the mesh, of second order in the cell, below 1 % where a cell at the bath is thinner than sqrt(κ Δt), which a tight
+    skin needs. Layers over steps of 5 s, in which the skin is entered by 0.5 µm, and of 5e4 s. Homogeneous columns over
+    twenty twentieths of h²/κ. And rest after a large change, which no coefficient enters: Newton's tolerance, and 1e-6 for
+    what the last steps leave of the slowest mode.
+    """
+    cells = 40
+    found = []
+    for name in DEFAULTS if quick else ("Potential", "Concentration", "Concentration, Multiplier"):
+        for of in ("K and D",) if quick else SCALED:
+            for tight_at in ("bath", "bottom"):
+                material, layers = layered(of, tight_at)
+                for step in (5.0, 5e4):
+                    reference = linear_column(layers, step, COUNT)
+                    title = f"{of} × 1e-4 at the {tight_at}, steps of {step:g} s"
+                    found.append(followed(title, name, reference, step, 1e-2, both_ends(cells), material))
+        uniform = {f"D₋/D₊ = {ratio:g}": {"D_minus": ratio * TABLE_1.number("D_plus")} for ratio in (100.0, 0.01)}
+        uniform |= {f"K = {K:.3g} mm⁴/(N s)": {"K": K} for K in 1.07 * 10.0 ** np.arange(-6.0, 1.0, 3 if quick else 1)}
+        for title, changed in uniform.items():
+            L = conductance(replace(TABLE_1, **changed), BATH)
+            step = HEIGHT**2 / diffusivities(storage(TABLE_1, BATH), L)[0][0] / COUNT
+            reference = linear_column([(HEIGHT, L)], step, COUNT)
+            found.append(followed(title, name, reference, step, 1e-2, column(HEIGHT, CELLS), replace(TABLE_1, **changed)))
+    for name in DEFAULTS if quick else CHOICES:
+        for tight_at in ("bath", "bottom"):
+            found.append(
+                rested(f"K and D × 1e-4 at the {tight_at}, at rest", name, 1e9, layered("K and D", tight_at)[0], 10)
+            )
+    return found
+
+
+def skin(quick: bool = False) -> dict[str, NDArray]:
+    """For a figure: error of the top's displacement over the cells, a tight skin at the bath in steps of 5 s."""
+    material, layers = layered("K and D", "bath")
+    reference = linear_column(layers, 5.0, COUNT)
+    counts = np.array([10, 20, 40] if quick else [10, 20, 40, 80, 160])
+    meshes: dict[str, Callable[[int], Mesh]] = {"even": partial(column, HEIGHT), "graded": both_ends}
+    found = {
+        kind: np.array([followed("", "Potential", reference, 5.0, np.inf, mesh(int(n)), material).error for n in counts])
+        for kind, mesh in meshes.items()
+    }
+    return {"cells": counts, **found}
+
+
+# -- penalties -----------------------------------------------------------------------------------------------------------
+
+
+def penalised_efflux(model: Model, relative: float) -> NDArray:
+    """Effluxes per excess of (P, Σ) of the linear column, cells of h = 1/40 mm.
+
+    `Potential` takes ε_p for P − P̄ with P = P_linear + c̄ Σ, and ε_c for c̃ − c̄ = c̄ Σ/(2 Rθ).
+    """
+    cell = HEIGHT / CELLS
+    if isinstance(model, Concentration):
+        return penalty_efflux(TABLE_1, BATH, relative, cell)
+    K, D = TABLE_1.number("K"), TABLE_1.number("D_plus")
+    return relative / cell * np.array([[K, K * BATH], [0.0, D * BATH / (2 * TABLE_1.RT)]])
+
+
+def penalties(quick: bool) -> list[Attempt]:
+    """Penalties from 1e-6 to 1e9 in units of K/h and D₊/h.
+
+    A penalty is a resistance in series: the top's displacement after a small change of the bath against the linear column
+    with effluxes ε times the excess, in the same time steps; for ε → 0 the column, uniform, relaxes like exp(−C⁻¹G t/h)
+    (`relaxed`). Steps cover the relaxation, h²/κ + h max eig(G⁻¹ C). Large ones are those of the exact treatments, to the
+    order of 1/ε (`test_hard_ions`). The mesh's share, 20 cells, is 7e-4. At rest the penalty does not enter.
+    """
+    L = conductance(TABLE_1, BATH)
+    C = storage(TABLE_1, BATH)
+    found = []
+    for relative in 10.0 ** np.arange(-6, 10, 3 if quick else 1):
+        for name in DEFAULTS:
+            G = penalised_efflux(CHOICES[name][0], relative)
+            slow = HEIGHT**2 / diffusivities(C, L)[0][0] / COUNT
+            slow += 4 * HEIGHT * float(np.abs(np.linalg.eigvals(np.linalg.solve(G, C))).max()) / COUNT
+            treatment, title = Penalty(relative=float(relative)), f"ε = {relative:g} K/h and D₊/h"
+            reference = linear_column([(HEIGHT, L)], slow, COUNT, G)
+            on = column(HEIGHT, CELLS)
+            found.append(followed(title, name, reference, slow, 2e-3, on, treatment=treatment))
+            found.append(rested(f"{title}, at rest", name, 1e4 * slow, TABLE_1, 10, treatment))
+    return found
+
+
+def relaxed(model: Model, relative: float, step: float) -> NDArray:
+    """`linear_column` for a vanishing penalty: C dw/dt = −G (w − w_D)/h, w uniform."""
+    C, G, target = storage(TABLE_1, BATH), penalised_efflux(model, relative), potentials(TABLE_1, BATH, salt=1.0)
+    w, found = np.zeros(2), []
+    for _ in range(COUNT):
+        w = np.linalg.solve(C * HEIGHT / step + G, C @ w * HEIGHT / step + G @ target)
+        found.append(float(HEIGHT * C[0] @ w))
+    return np.array(found)
+
+
+# -- cycles --------------------------------------------------------------------------------------------------------------
+
+HALF = 50.0
+"""Half a cycle [s], two steps."""
+
+
+def cycles(quick: bool) -> list[Attempt]:
+    """The bath goes between 0.15 and 0.125 mol/l in cycles of 100 s, a hundred or a thousand times, in steps of 25 s.
+
+    "repeats": fluid and cations held at the end of the last cycle against the cycle before, and against the middle of the run:
+    the column forgets its start like exp(−0.5) a cycle, so that after fifty nothing but round-off is left. The ledger may
+    open in proportion to the steps: each leaves what Newton's method leaves, 3e-15 of what is held, and in a periodic
+    state always of the same sign. Ten times that is the bound.
+    """
+    count = 100 if quick else 1000
+    bath = Ramp(*((HALF * k, BATH if k % 2 == 0 else DILUTED) for k in range(2 * count + 1)))
+    found = []
+    for name in DEFAULTS:
+        held = Ledger()
+
+        def error(scene: Scene, result: Result, held: Ledger = held) -> float:
+            ends = np.array([amount[:: len(result.steps) // count] for amount in (held.fluid, held.cations)])
+            return float((np.abs(ends[:, [-2, count // 2]] - ends[:, [-1]]) / ends[:, [-1]]).max())
+
+        found.append(
+            attempt(
+                f"{count} cycles",
+                name,
+                partial(column_scene, *CHOICES[name], bath, 4),
+                2 * HALF * count,
+                "repeats",
+                error,
+                1e-14,
+                Fixed(HALF / 2),
+                [held],
+                newton=ACCURATE,
+                ledger_bound=3e-14 * 4 * count,
+            )
+        )
+    return found
+
+
+FAMILIES = (bath_range, charge, sudden_steps, contrasts, penalties, cycles)
