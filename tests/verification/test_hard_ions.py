@@ -1,15 +1,16 @@
-"""Hard cases of ions, of time and of contrasts at a small size, and what their bounds rest on: see `studies/hard_ions.py`."""
+"""Hard cases of ions, of time and of contrasts at a small size, and what their bounds rest on (`studies/hard_ions.py`)."""
 
 import numpy as np
 import pytest
 
-from ngswell import TABLE_1, Fixed, Newton, Penalty, Probe, Ramp, column
+from ngswell import TABLE_1, Adaptive, Fixed, Ledger, Newton, Penalty, Probe, Ramp, StepError, column
 from ngswell.linear import LinearColumn, conductance
 from ngswell.stepping import _following
 from studies.hard import CHOICES
 from studies.hard_ions import (
     BATH,
     CELLS,
+    CHARGED,
     COUNT,
     FAMILIES,
     HEIGHT,
@@ -86,7 +87,7 @@ def test_a_vanishing_penalty_leaves_a_uniform_column(name):
         assert np.abs(relaxed(model, relative, step) / spectral - 1).max() < 20 * relative
 
 
-@pytest.mark.parametrize("name, exact", [("Potential", "Potential"), ("Concentration", "Concentration, Multiplier")])
+@pytest.mark.parametrize(("name", "exact"), [("Potential", "Potential"), ("Concentration", "Concentration, Multiplier")])
 def test_large_penalties_approach_the_exact_treatment(name, exact):
     def displacement(name, treatment):
         top = Probe((HEIGHT,), "displacement")
@@ -114,7 +115,8 @@ def test_layers_converge_with_the_square_of_the_cell():
 def test_a_skin_thinner_than_the_cells_needs_grading():
     """Negative control: on even cells the displacement is off by several times itself."""
     found = skin(quick=True)
-    assert found["even"].min() > 1 and found["graded"][-1] < 5e-3
+    assert found["even"].min() > 1
+    assert found["graded"][-1] < 5e-3
     # and exchanging the layers is not within the bounds either
     material, _ = layered("K and D", "bath")
     _, swapped = layered("K and D", "bottom")
@@ -129,14 +131,12 @@ def test_kinks_are_found_by_bisection():
     times = [0.0, 1.0, 1.0 + 1e-13, 2.0]
     assert _following(times, 0.5) == (False, 1.0)
     assert _following(times, 1.0) == (True, 2.0) == _following(times, 1.0 + 2e-13)
-    assert _following(times, 2.0) == (True, np.inf) and _following([], 1.0) == (False, np.inf)
+    assert _following(times, 2.0) == (True, np.inf)
+    assert _following([], 1.0) == (False, np.inf)
 
 
 def test_a_retried_step_counts_the_old_charge():
     """A charge that outruns the salt is retried without extrapolation; its ions must not come out of nothing."""
-    from ngswell import Adaptive, Ledger, StepError
-    from studies.hard_ions import CHARGED
-
     ledger = Ledger()
     scene = column_scene(*CHOICES["Potential"], BATH, 10, CHARGED, loads=(), charge=Ramp((0.0, 0.0), (1e3, 1.0)))
     with pytest.raises(StepError):  # anions run out
