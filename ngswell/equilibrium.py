@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from numpy.typing import NDArray
 
 from ngswell.baths import Frozen, Lagged
+from ngswell.diagnosis import UNDETERMINED, singular_mode
 from ngswell.errors import InputError, StepError
 from ngswell.newton import Newton, Outcome
 from ngswell.problem import Problem, Snapshot
@@ -51,9 +52,10 @@ def equilibrate(
         return method.solve(problem, solver)
 
     def give_up(share: float, outcome: Outcome) -> StepError:
-        reason = f"at {share:.3g} of the charge, {outcome.reason}"
-        remedy = "Remedies: a smaller load, a finer mesh where the field is worst."
-        return StepError(time, STATIONARY, outcome.field, outcome.where, reason, remedy)
+        found, reason, remedy = singular_mode(problem), outcome.reason, outcome.remedy
+        if found:
+            reason, remedy = f"the linear system is singular: {found}", UNDETERMINED
+        return StepError(time, STATIONARY, outcome.field, outcome.where, f"at {share:.3g} of the charge, {reason}", remedy)
 
     outcome = solve(0.0, problem.vector.copy())
     if outcome.reason is not None:

@@ -14,12 +14,24 @@ from ngswell.solvers import LinearSolver
 
 @dataclass(frozen=True)
 class Outcome:
-    """How one nonlinear solve ended: `reason` is None on success, else what went wrong, in which field and where."""
+    """How a nonlinear solve ended: `reason` is None on success, else what went wrong, in which field, where; what helps."""
 
     iterations: int
     reason: str | None = None
     field: str = ""
     where: tuple[float, ...] = ()
+    remedy: str = ""
+
+
+SQUEEZED = "Remedies: a smaller or slower load or change of the bath, a finer mesh there."
+UNRESOLVED = (
+    "Remedies: Potential(), whose ions cannot be negative; Penalty or Multiplier in place of Nitsche; "
+    "finer cells at the bath."
+)
+LOST = (
+    "Remedies: a gentler ramp, a finer mesh where the field is worst, a weaker penalty; the surface of a gel that is held "
+    "sideways and swells beyond J = 2.5 may wrinkle."
+)
 
 
 @dataclass(frozen=True)
@@ -62,17 +74,23 @@ class Newton:
 
         def failure(count: int, reason: str) -> Outcome:
             field, where = problem.worst(correction.FV().NumPy())
-            return Outcome(count, reason, field, where)
+            return Outcome(count, reason, field, where, LOST)
 
         def left(change: float) -> float:
             """What further corrections with the present factorisation would add up to, after one of this size."""
             rate = solver.contraction
             return change if rate is None or not self.slowest else change * min(1.0, rate / (1 - rate))
 
+        def success(count: int) -> Outcome:
+            found = problem.inadmissible_solution()
+            if found is None:
+                return Outcome(count)
+            return Outcome(count, f"{found[0]} is not positive in the solution", found[0], found[1], UNRESOLVED)
+
         correction[:] = 0.0
         found = problem.inadmissible()
         if found:
-            return Outcome(0, f"the step starts with {found[0]} not positive", found[0], found[1])
+            return Outcome(0, f"the step starts with {found[0]} not positive", found[0], found[1], SQUEEZED)
         problem.residual(residual)
         renew = not self._may_keep(solver)
         known = False  # whether `correction` answers the present residual
@@ -89,7 +107,7 @@ class Newton:
                 refused = problem.inadmissible()
                 if refused is None:
                     if damping == 1.0 and (before if renew else left(before)) <= self.tolerance:
-                        return Outcome(count)
+                        return success(count)
                     problem.residual(residual)
                     if solve(simplified):
                         rate = size(simplified) / before
@@ -101,7 +119,7 @@ class Newton:
                 if damping < self.least_damping:
                     vector[:] = start
                     if refused:
-                        return Outcome(count, f"{refused[0]} would not stay positive", refused[0], refused[1])
+                        return Outcome(count, f"{refused[0]} would not stay positive", refused[0], refused[1], SQUEEZED)
                     return failure(count, "Newton's method stalls: no damped step reduces the correction")
             if not renew and (refused or not rate < 1):
                 vector[:] = start
@@ -111,7 +129,7 @@ class Newton:
             solver.contraction = max(rate, solver.contraction or 0.0)
             if damping == 1.0 and left(size(simplified)) <= self.tolerance:
                 vector -= simplified.FV().NumPy()
-                return Outcome(count)
+                return success(count)
             known = damping == 1.0 and self._may_keep(solver)
             renew = not known
             correction.data = simplified

@@ -32,7 +32,7 @@ from numpy.typing import NDArray
 
 from ngswell.baths import Bath, BathFields, Lagged, Multiplier, Treatment, Weak
 from ngswell.models.terms import Setting, Term
-from ngswell.quadrature import points, vertices
+from ngswell.quadrature import points, points_and_corners, vertices
 from ngswell.sampling_rules import BathBoundary, Slopes
 from ngswell.schedules import Signal
 from ngswell.supports import Traction, Weight
@@ -335,23 +335,37 @@ class Problem:
 
     @cached_property
     def _quadrature(self) -> NDArray:
-        return points(self.mesh, VOL, 2 * self.model.order)
+        return points(self.mesh, VOL, 2 * self.model.order + BONUS_ORDER)
 
     @cached_property
-    def _positions(self) -> NDArray:
-        return CF((x, y, z)[: self.mesh.dim])(self._quadrature)
+    def _bounds(self) -> dict[str, tuple[Any, NDArray]]:
+        """What has to stay positive, and where: at the forms' own points; the fluid content at the cells' corners too, where
+        cells turn over first."""
+        everywhere = points_and_corners(self.mesh, 2 * self.model.order + BONUS_ORDER)
+        bounds = {"fluid content J − nS0": (self.state.content.Compile(), everywhere)}
+        return bounds | self._at_own_points(self.model.bounds(self.state))
 
     @cached_property
-    def _bounds(self) -> dict[str, Any]:
-        return {name: field.Compile() for name, field in self.model.bounds(self.state).items()}
+    def _solution_bounds(self) -> dict[str, tuple[Any, NDArray]]:
+        return self._at_own_points(self.model.solution_bounds(self.state))
+
+    def _at_own_points(self, bounds: dict[str, Any]) -> dict[str, tuple[Any, NDArray]]:
+        return {name: (field.Compile(), self._quadrature) for name, field in bounds.items()}
 
     def inadmissible(self) -> tuple[str, tuple[float, ...]] | None:
-        """What leaves the physical range at a quadrature point, and where; None if nothing does."""
-        for name, field in self._bounds.items():
-            values = field(self._quadrature).ravel()
+        """What leaves the physical range at a monitored point, and where; None if nothing does."""
+        return self._not_positive(self._bounds)
+
+    def inadmissible_solution(self) -> tuple[str, tuple[float, ...]] | None:
+        """The same of what only a solution has to keep positive."""
+        return self._not_positive(self._solution_bounds)
+
+    def _not_positive(self, bounds: dict[str, tuple[Any, NDArray]]) -> tuple[str, tuple[float, ...]] | None:
+        for name, (field, where) in bounds.items():
+            values = field(where).ravel()
             worst = int(np.argmin(np.where(np.isfinite(values), values, -np.inf)))
             if not values[worst] > 0:
-                return name, tuple(self._positions[worst])
+                return name, tuple(CF((x, y, z)[: self.mesh.dim])(where[worst : worst + 1]).ravel())
         return None
 
     @cached_property

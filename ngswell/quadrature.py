@@ -8,10 +8,31 @@ from numpy.typing import NDArray
 
 _SHAPES = (ET.SEGM, ET.TRIG, ET.QUAD, ET.TET, ET.HEX, ET.PRISM, ET.PYRAMID)
 
+_CORNERS: dict[ET, list[tuple[float, ...]]] = {
+    ET.SEGM: [(0,), (1,)],
+    ET.TRIG: [(0, 0), (1, 0), (0, 1)],
+    ET.QUAD: [(0, 0), (1, 0), (1, 1), (0, 1)],
+    ET.TET: [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)],
+    ET.HEX: [(r, s, t) for r in (0, 1) for s in (0, 1) for t in (0, 1)],
+    ET.PRISM: [(r, s, t) for r, s in ((0, 0), (1, 0), (0, 1)) for t in (0, 1)],
+    ET.PYRAMID: [(r, s, 0) for r in (0, 1) for s in (0, 1)],  # at the tip gradients are not defined
+}
+"""Corners of the reference cells."""
+
 
 def points(mesh: Mesh, region: object = VOL, order: int = 4) -> NDArray:
     """Mapped integration points of degree `order` on all elements of `region`; any CoefficientFunction takes them."""
     return mesh.MapToAllElements({shape: IntegrationRule(shape, order) for shape in _SHAPES}, region)
+
+
+def points_and_corners(mesh: Mesh, order: int) -> NDArray:
+    """The same on the cells of the body, with their corners."""
+    rules = {}
+    for shape, corners in _CORNERS.items():
+        rule = IntegrationRule(shape, order)
+        places = [point if isinstance(point, tuple) else (point,) for point in rule.points]
+        rules[shape] = IntegrationRule([*places, *corners], [*rule.weights, *(0.0 for _ in corners)])
+    return mesh.MapToAllElements(rules, VOL)
 
 
 def integral_on_boundary(

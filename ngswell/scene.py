@@ -11,9 +11,11 @@ from time import perf_counter
 
 import numpy as np
 from ngsolve import CoefficientFunction, FESpace, Mesh, TaskManager, specialcf
+from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from ngswell.baths import Bath, Lagged, Multiplier, Treatment, Weak
+from ngswell.diagnosis import cannot_change_volume, free_motion, parts
 from ngswell.equilibrium import equilibrate
 from ngswell.errors import InputError
 from ngswell.kinematics import Kinematics
@@ -146,7 +148,7 @@ class Scene:
                     if name in bath_boundaries:
                         raise InputError(f"Symmetry on {name!r}: it has a bath, but nothing flows through a symmetry plane")
         self.kinematics.check(self.mesh, self.held())
-        self._check_rigid_motions()
+        self._check_parts()
 
     def _check_loads(self) -> None:
         held = self.held()
@@ -164,25 +166,51 @@ class Scene:
         if sum(isinstance(load, Weight) for load in self.loads) > 1:
             raise InputError("loads hold more than one Weight; add the vectors up")
 
-    def _check_rigid_motions(self) -> None:
-        """Refuse supports that leave the body free to translate or rotate."""
-        directions = self.kinematics.directions
-        rows, held, places = [], self.held(), vertices(self.mesh)
-        places -= places.mean(axis=0)
-        places /= np.abs(places).max()
-        for axis, direction in enumerate(directions):
-            fixed = {number for name in held[direction].split("|") if name for number in vertices_of(self.mesh, name)}
-            fixed |= {self._vertex(s) for s in self.supports if isinstance(s, Pin) and direction in s.direction}
-            rows += [self.kinematics.rigid_motions(places[number])[axis] for number in fixed]
-        shapes = self.kinematics.rigid_motions(places[0])
-        motions = shapes.shape[1]
-        _, sizes, modes = np.linalg.svd(np.array(rows).reshape(-1, motions))
-        rank = int((sizes > 1e-9).sum())
-        if rank < motions:
-            motion = int(np.argmax(np.abs(modes[-1])))
-            uniform = (shapes[:, motion] == self.kinematics.rigid_motions(places[-1])[:, motion]).all()
-            free = f"translate in {directions[int(np.argmax(np.abs(shapes[:, motion])))]}" if uniform else "rotate"
-            raise InputError(f"the body can {free}: add a Roller, Symmetry or Pin")
+    def _check_parts(self) -> None:
+        """Refuse parts of the body that are free to translate or rotate, or whose pressure has no level."""
+        places, held, bodies = vertices(self.mesh), self.held(), parts(self.mesh)
+        self._check_separate(places, bodies)
+        fixed = {
+            (number, axis)
+            for axis, direction in enumerate(self.kinematics.directions)
+            for name in held[direction].split("|")
+            if name
+            for number in vertices_of(self.mesh, name)
+        }
+        fixed |= {
+            (self._vertex(pin), self.kinematics.directions.index(direction))
+            for pin in self.supports
+            if isinstance(pin, Pin)
+            for direction in pin.direction
+        }
+        wet = {number for bath in self.baths for number in vertices_of(self.mesh, bath.boundary)}
+        for body in bodies:
+            place = ", ".join(f"{x:.4g}" for x in places[body].mean(axis=0))
+            what = "the body" if len(bodies) == 1 else f"the part near ({place}) mm, one of {len(bodies)} not connected,"
+            number_in_part = {int(number): index for index, number in enumerate(body)}
+            mine = [(number_in_part[number], axis) for number, axis in sorted(fixed) if number in number_in_part]
+            motion = free_motion(self.kinematics, places[body], mine)
+            if motion:
+                raise InputError(f"{what} can {motion}: add a Roller, Symmetry or Pin")
+            if wet.isdisjoint(number_in_part) and cannot_change_volume(self.mesh, self.kinematics, held, body):
+                raise InputError(
+                    f"{what} has no bath and is held on all sides, so nothing determines the level of its pressure: "
+                    "give it a bath, or leave a side free"
+                )
+
+    def _check_separate(self, places: NDArray, bodies: list[NDArray]) -> None:
+        """Refuse parts that touch without sharing vertices: they would not know of each other."""
+        size = float(np.ptp(places, axis=0).max())
+        seen: dict[tuple[int, ...], int] = {}
+        for index, body in enumerate(bodies if len(bodies) > 1 else []):
+            for number in body:
+                key = tuple(np.round(places[number] / (1e-9 * size)).astype(int).tolist())
+                if seen.setdefault(key, index) != index:
+                    place = ", ".join(f"{x:.4g}" for x in places[number])
+                    raise InputError(
+                        f"mesh: two parts that are not connected touch near ({place}) mm: merge their vertices "
+                        "(Glue in netgen.occ, Coherence in Gmsh)"
+                    )
 
     def _vertex(self, pin: Pin) -> int:
         places = vertices(self.mesh)

@@ -11,8 +11,9 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from ngswell.diagnosis import UNDETERMINED, singular_mode
 from ngswell.errors import InputError, StepError
-from ngswell.newton import Newton, Outcome
+from ngswell.newton import LOST, Newton, Outcome
 from ngswell.problem import Problem
 from ngswell.schemes import BACKWARD_EULER, ESDIRK4, Scheme
 from ngswell.solvers import LinearSolver
@@ -205,12 +206,13 @@ class Stepper:
                 if self.control.accepts(error) or jumps:
                     break
                 reason, (field, where) = f"error {error:.2g}", problem.worst(problem.vector - old)
+                remedy = "Remedies: a larger tolerance, a gentler ramp, a finer mesh where the field is worst."
                 power = scheme.power if last is None else np.log(last[1] / error) / np.log(last[0] / dt)
                 stuck = power < STUCK
                 last = dt, error
                 self.wanted = self.control.next(dt, error, np.clip(power, 1, scheme.power))
             else:
-                reason, field, where = outcome.reason, outcome.field, outcome.where
+                reason, field, where, remedy = outcome.reason, outcome.field, outcome.where, outcome.remedy
                 stuck = bool(rejected)
                 self.wanted = dt / 4
             rejected.append(f"dt = {dt:.3g} s: {reason}")
@@ -221,7 +223,9 @@ class Stepper:
             problem.vector[:] = old
             problem.set_time(time)
             if self.wanted < SMALLEST_STEP * to_kink:
-                remedy = "Remedies: a gentler ramp, a finer mesh where the field is worst, a weaker penalty."
+                found = self._singular_mode(time, tried)
+                if found:
+                    reason, remedy = f"the linear system is singular: {found}", UNDETERMINED
                 raise StepError(time, dt, field, where, reason, remedy)
         self._slope = self._next_slope
         self._careful = max(0, self._careful - 1)
@@ -234,6 +238,15 @@ class Stepper:
         proposed = self.control.next(dt, error, scheme.power)
         self.wanted = max(self.wanted, proposed) if landed_short else proposed
         return StepReport(end, dt, outcome.iterations, tuple(rejected), error)
+
+    def _singular_mode(self, time: float, dt: float) -> str:
+        """What the matrix of a step of backward Euler from the present state leaves undetermined, in words."""
+        old = self.problem.vector.copy()
+        self.problem.begin_step(time + dt, dt)
+        found = singular_mode(self.problem)
+        self.problem.vector[:] = old
+        self.problem.set_time(time)
+        return found
 
     def _solve(self, dt: float) -> Outcome:
         """The nonlinear system of a stage whose step of backward Euler is `dt`."""
@@ -297,7 +310,7 @@ class Stepper:
         right, error = self._work
         right.FV().NumPy()[:] = scheme.difference @ np.array(slopes) / scheme.diagonal
         if not self.solver.solve(right, error):
-            return Outcome(iterations, "the estimated error is not finite", *problem.worst(problem.vector - old)), inf
+            return Outcome(iterations, "the estimated error is not finite", *problem.worst(problem.vector - old), LOST), inf
         return Outcome(iterations), self._relative(error.FV().NumPy())
 
     def _relative(self, difference: NDArray) -> float:

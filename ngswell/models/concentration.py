@@ -16,6 +16,9 @@ from ngswell.materials import Material
 from ngswell.models.mechanics import SolidState
 from ngswell.models.terms import Setting, Term, check_order, needs_salt
 
+NEGLIGIBLE = 1e-3
+"""Share of the cations by which anions may fall below zero: vanishing ones are the small difference of two fields."""
+
 
 @dataclass(frozen=True)
 class State(SolidState):
@@ -126,4 +129,7 @@ class Concentration:
         return {"u": length, "p": stress, "c": concentration, "cfc": concentration}
 
     def bounds(self, state: State) -> dict[str, CoefficientFunction]:
-        return {"fluid content J − nS0": state.content, "cation concentration": state.c}
+        return {"cation concentration": state.c}
+
+    def solution_bounds(self, state: State) -> dict[str, CoefficientFunction]:
+        return {"anion concentration c₊ − cfc": (1 + NEGLIGIBLE) * state.c - state.cfc}

@@ -56,4 +56,7 @@ class OnePressure:
         return {"u": length, self.unknowns[1]: stress}
 
     def bounds(self, state: Any) -> dict[str, CoefficientFunction]:
-        return {"fluid content J − nS0": state.content}
+        return {}
+
+    def solution_bounds(self, state: Any) -> dict[str, CoefficientFunction]:
+        return {}

@@ -115,4 +115,7 @@ class Potential:
         return {"u": length, "P": stress, "salt": concentration}
 
     def bounds(self, state: State) -> dict[str, CoefficientFunction]:
-        return {"fluid content J − nS0": state.content, "salt concentration c̃": state.salt}
+        return {"salt concentration c̃": state.salt}
+
+    def solution_bounds(self, state: State) -> dict[str, CoefficientFunction]:
+        return {}

@@ -93,7 +93,11 @@ class Model(Protocol):
         ...
 
     def bounds(self, state: Any) -> dict[str, CoefficientFunction]:
-        """Fields that have to stay positive, by name."""
+        """Concentrations that have to stay positive, by name; the fluid content has to in every model."""
+        ...
+
+    def solution_bounds(self, state: Any) -> dict[str, CoefficientFunction]:
+        """What else has to be positive in a solution, though not in every iterate on the way to it."""
         ...
 
 

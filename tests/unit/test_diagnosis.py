@@ -1,0 +1,145 @@
+"""What leaves a scene undetermined is named: before computing where the scene shows it, else when a step fails."""
+
+import numpy as np
+import pytest
+from conftest import confined_column, strip
+from netgen.occ import Compound, Glue, MoveTo, Y
+from ngsolve import x, y
+
+from ngswell import (
+    TABLE_1,
+    Axisymmetric,
+    Bath,
+    Concentration,
+    Fixed,
+    InputError,
+    Material,
+    PlaneStrain,
+    Potential,
+    Roller,
+    Scene,
+    StepError,
+    Uncharged,
+    Weight,
+    column,
+    from_occ,
+    rectangle,
+)
+from ngswell.diagnosis import parts, singular_mode
+
+NO_CHARGE = Material(mu=0.24, lam=0.02, nS0=0.25, cfc0=0.0, D_plus=5e-4, D_minus=8e-4, K=1e-3)
+MODELS = {
+    "Uncharged": (Uncharged(), NO_CHARGE, None),
+    "Potential": (Potential(), TABLE_1, 0.15),
+    "Concentration": (Concentration(), TABLE_1, 0.15),
+}
+ALL_AROUND = [Roller("left|right", "x"), Roller("bottom|top", "y")]
+
+
+def two_squares(gap, glue=False):
+    lower = MoveTo(0, 0).Rectangle(1, 1).Face()
+    lower.edges.Min(Y).name = "bottom"
+    upper = MoveTo(0, 1 + gap).Rectangle(1, 1).Face()
+    upper.edges.Max(Y).name = "top"
+    return from_occ(Glue([lower, upper]) if glue else Compound([lower, upper]), maxh=0.5)
+
+
+def sealed(model, **changes):
+    unknowns, material, salt = MODELS[model]
+    fields = {
+        "mesh": rectangle(1.0, 1.0, 2, 2),
+        "kinematics": PlaneStrain(),
+        "material": material,
+        "model": unknowns,
+        "initial": (salt, 0.0),
+        "loads": [Weight((0.0, -1e-3), (0.0, -2e-3))],
+    }
+    return Scene(**fields | changes)
+
+
+def gel(mesh, supports, baths):
+    return Scene(mesh=mesh, kinematics=PlaneStrain(), material=TABLE_1, supports=supports, baths=baths)
+
+
+def test_a_part_that_nothing_holds_is_named():
+    mesh = two_squares(0.5)
+    assert sorted(len(part) for part in parts(mesh)) == [9, 9]
+    baths = [Bath("bottom|top", c=0.15)]
+    with pytest.raises(InputError, match=r"part near \(0.5, 1.\d+\) mm, one of 2 not connected, can rotate"):
+        gel(mesh, [Roller("bottom", "xy")], baths)
+    gel(mesh, [Roller("bottom|top", "xy")], baths)
+    with pytest.raises(InputError, match="level"):  # the upper part would be sealed and held
+        Scene(
+            mesh=mesh,
+            kinematics=PlaneStrain(),
+            material=TABLE_1,
+            supports=[Roller("bottom|top|default", "xy")],
+            baths=[Bath("bottom", c=0.15)],
+        )
+
+
+def test_parts_that_touch_without_sharing_vertices_are_refused():
+    supports, baths = [Roller("bottom|top", "xy")], [Bath("bottom|top", c=0.15)]
+    with pytest.raises(InputError, match=r"two parts that are not connected touch near .* merge their vertices"):
+        gel(two_squares(0.0), supports, baths)
+    gel(two_squares(0.0, glue=True), supports, baths)
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_a_pressure_without_a_level_is_refused(model):
+    with pytest.raises(InputError, match="level of its pressure: give it a bath, or leave a side free"):
+        sealed(model, supports=ALL_AROUND)
+    # With a free side momentum sets the level; rollers along a side do not hold its volume.
+    assert sealed(model, supports=[Roller("left|right", "x"), Roller("bottom", "y")]).run(10.0, Fixed(10.0)).steps
+    sealed(model, supports=[Roller("left|right", "xy"), Roller("bottom", "y")])
+
+
+def test_other_motions_without_change_of_volume_are_refused():
+    with pytest.raises(InputError, match="level"):
+        confined_column(baths=[], loads=[], supports=[Roller("bottom|top", "x")], initial=(0.15, 0.0))
+    with pytest.raises(InputError, match="level"):
+        sealed("Uncharged", kinematics=Axisymmetric(), supports=[Roller("left|right", "r"), Roller("bottom|top", "z")])
+    assert column(1.0, 3).nv == len(parts(column(1.0, 3))[0])
+
+
+@pytest.mark.parametrize(
+    ("supports", "words"),
+    [
+        (ALL_AROUND, "nothing determines the level of [pP]"),
+        ([Roller("left|right", "x")], "the body can translate in y"),
+    ],
+)
+@pytest.mark.parametrize("model", MODELS)
+def test_a_singular_system_is_named_when_a_step_fails(model, supports, words, monkeypatch):
+    # Without the checks of the scene: what else may leave a system undetermined is found in its matrix.
+    monkeypatch.setattr(Scene, "_check_parts", lambda scene: None)
+    with pytest.raises(StepError, match=rf"the linear system is singular: {words}.*Remedies: a support") as caught:
+        sealed(model, supports=supports).run(100.0, Fixed(10.0))
+    assert caught.value.time == 0.0
+
+
+@pytest.mark.parametrize("dt", [1e-9, 1.0, 1e9, 1e30])
+@pytest.mark.parametrize("model", [Concentration(), Potential()])
+def test_a_regular_system_is_not_called_singular(model, dt):
+    for scene in (strip(None, model=model, cells=(2, 10)), confined_column(None, model=model)):
+        problem = scene.problem
+        problem.initialise()
+        problem.begin_step(dt, dt)
+        assert singular_mode(problem) == ""
+
+
+def test_a_cell_that_turns_over_at_a_corner_is_found(monkeypatch):
+    """J − nS0 is watched where cells turn over first: here at one corner, while it is positive at all integration points."""
+    problem = strip(mesh=rectangle(1.0, 1.0, 1, 1), loads=[]).problem
+    problem.initialise()
+    # Only the middle of the bottom edge moves: J falls along this edge.
+    problem.fields.components[0].Set((0.2 * x * (1 - x) * (1 - y), 0 * y))
+    assert problem.inadmissible() is None
+    problem.fields.components[0].Set((0.85 * x * (1 - x) * (1 - y), 0 * y))
+    name, where = problem.inadmissible()
+    assert name == "fluid content J − nS0"
+    assert where == pytest.approx((1.0, 0.0))
+    inside = problem.state.content(problem._quadrature)
+    assert inside.min() > 0
+    assert np.isfinite(problem.state.J(problem.mesh(1.0, 0.0)))
+    assert problem.state.J(problem.mesh(1.0, 0.0)) < TABLE_1.nS0
