@@ -128,7 +128,10 @@ class Newton:
                 continue
             solver.contraction = max(rate, solver.contraction or 0.0)
             if damping == 1.0 and left(size(simplified)) <= self.tolerance:
+                tested = vector.copy()
                 vector -= simplified.FV().NumPy()
+                if problem.inadmissible():
+                    vector[:] = tested  # within the tolerance as well
                 return success(count)
             known = damping == 1.0 and self._may_keep(solver)
             renew = not known
