@@ -6,12 +6,12 @@ A schedule is a plain value. A run turns it into a `Signal`: an NGSolve field wh
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Protocol
 
-import numpy as np
 from ngsolve import CoefficientFunction, Parameter
 
 from ngswell.errors import InputError
@@ -67,7 +67,11 @@ class Ramp:
 
     def at(self, time: float) -> float:
         """Value at `time` [s]."""
-        return float(np.interp(time, self.times, self.values))
+        after = bisect_right(self.times, time)
+        if after == 0 or after == len(self.times):
+            return self.values[after - 1 if after else 0]
+        before, start, end = self.values[after - 1], self.times[after - 1], self.times[after]
+        return before + (self.values[after] - before) / (end - start) * (time - start)
 
     def signal(self) -> Signal:
         parameter = Parameter(self.values[0])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import inf
@@ -209,12 +210,12 @@ class Stepper:
     def advance(self, time: float, kinks: list[float], stops: list[float]) -> StepReport:
         """One accepted step from `time`. Raises StepError, with the fields restored, when none succeeds.
 
-        The error estimate forgets its past at `kinks`; `stops` are only landed on.
+        The error estimate forgets its past at `kinks`; `stops` are only landed on. Both are sorted, the end is a kink.
         """
         problem, history = self.problem, self.history
-        at_kink = any(_same(time, kink) for kink in kinks)
-        to_kink = min(kink for kink in kinks if kink > time and not _same(kink, time)) - time
-        stop = min(stop for stop in [*stops, *kinks] if stop > time and not _same(stop, time))
+        at_kink, kink = _following(kinks, time)
+        to_kink = kink - time
+        stop = min(kink, _following(stops, time)[1])
         to_stop = stop - time
         if at_kink or self.wanted is None:
             history.forget()
@@ -295,6 +296,7 @@ class Stepper:
         outcome = self._solve(dt)
         if outcome.reason and guess is not None:  # the extrapolation may be what is inadmissible
             problem.vector[:] = old
+            problem.set_time(time)  # the old contents are those of the old charge
             problem.begin_step(end, dt)
             outcome = self._solve(dt)
         problem.stages = [(dt, end, problem.vector.copy())]
@@ -372,6 +374,16 @@ def _rms(values: NDArray) -> float:
 
 def _same(a: float, b: float) -> bool:
     return abs(a - b) <= 1e-12 * max(1.0, abs(a), abs(b))
+
+
+def _following(times: Sequence[float], time: float) -> tuple[bool, float]:
+    """Whether `time` is one of the sorted `times`, and the one that follows it."""
+    first = last = bisect_left(times, time)
+    while first > 0 and _same(times[first - 1], time):
+        first -= 1
+    while last < len(times) and _same(times[last], time):
+        last += 1
+    return first < last, times[last] if last < len(times) else inf
 
 
 def _landing(wanted: float, remaining: float) -> float:
