@@ -29,3 +29,23 @@ class StepError(NgswellError, RuntimeError):
             f"no step succeeds after t = {time:.10g} s (last tried: {step:.3g} s): {reason}; "
             f"worst field {field} near ({place}) mm. The fields hold the state at t = {time:.10g} s. {remedy}"
         )
+
+
+class InstabilityError(StepError):
+    """The state reached is unstable, or its growth is not followed by the steps. The scene's fields hold it.
+
+    Beside those of StepError, attributes: `rate` of growth [1/s] (infinite: without flow), `wavelength` [mm] of the mode.
+    """
+
+    def __init__(
+        self, time: float, step: float, where: tuple[float, ...], rate: float, wavelength: float, reason: str
+    ) -> None:
+        self.time, self.step, self.field, self.where, self.reason = time, step, "u", where, reason
+        self.rate, self.wavelength = rate, wavelength
+        RuntimeError.__init__(self, f"{reason} The fields hold the state at t = {time:.10g} s. {REMEDY}")
+
+
+REMEDY = (
+    "Remedies: to let it grow, an imperfection that seeds it, steps well below that time and Stability(follow=True); to "
+    "avoid it, a bath of more salt, a surface that is held, or Confined, which leaves wrinkles out."
+)
