@@ -7,10 +7,12 @@ from typing import TYPE_CHECKING
 
 from numpy.typing import NDArray
 
+from ngswell import checks
 from ngswell.baths import Frozen, Lagged
 from ngswell.errors import InputError, StepError
 from ngswell.newton import Newton, Outcome
 from ngswell.problem import Problem, Snapshot
+from ngswell.schedules import LARGEST
 from ngswell.solvers import LinearSolver, solver_of
 
 if TYPE_CHECKING:
@@ -36,7 +38,7 @@ def equilibrate(
     sealed body (what it holds is not determined by balances) and for treatments that remember the past, and StepError when
     no more of the charge can be added.
     """
-    time = scene.start if time is None else time
+    time = scene.start if time is None else checks.number("equilibrate: time", time, "s", -LARGEST, LARGEST)
     if not scene.baths:
         raise InputError("equilibrate: the body is sealed, so its content at rest is not determined; give it a bath")
     for bath in scene.baths:

@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import inf
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ngswell import checks
 from ngswell.errors import InputError, StepError
 from ngswell.newton import Newton, Outcome
 from ngswell.problem import Problem
@@ -28,6 +29,7 @@ class StepReport:
     error: float | None = None
 
 
+@runtime_checkable
 class Control(Protocol):
     """Chooses the scheme, how its equations are solved, and step sizes [s]."""
 
@@ -56,7 +58,8 @@ class Fixed:
     scheme: Scheme = BACKWARD_EULER
 
     def __post_init__(self) -> None:
-        _positive("Fixed step", self.step, "s")
+        checks.settle(self, step=checks.positive("Fixed step", self.step, "s"))
+        check_scheme("Fixed", self.scheme)
 
     @property
     def newton(self) -> Newton:
@@ -86,8 +89,13 @@ class Adaptive:
     scheme: Scheme = ESDIRK4
 
     def __post_init__(self) -> None:
-        _positive("Adaptive tolerance", self.tolerance, "")
-        _positive("Adaptive largest", self.largest, "s")
+        tolerance = checks.positive("Adaptive tolerance", self.tolerance)
+        if tolerance > 1:
+            raise InputError(f"Adaptive tolerance = {tolerance:g} is above 1: errors are relative to the changes, take 1e-3")
+        checks.settle(self, tolerance=tolerance)
+        if not (checks.is_number(self.largest) and self.largest == inf):
+            checks.settle(self, largest=checks.positive("Adaptive largest", self.largest, "s"))
+        check_scheme("Adaptive", self.scheme)
 
     @property
     def newton(self) -> Newton:
@@ -112,9 +120,9 @@ class Adaptive:
         return error <= self.tolerance
 
 
-def _positive(name: str, value: float, unit: str) -> None:
-    if not value > 0:
-        raise InputError(f"{name} has to be positive, got {value!r} {unit}".rstrip())
+def check_scheme(what: str, scheme: object) -> None:
+    """Refuse what is no scheme."""
+    checks.instance(f"{what}: scheme", scheme, Scheme, "BACKWARD_EULER or ESDIRK4")
 
 
 NEWTON_SHARE = 3e-3
@@ -181,9 +189,11 @@ class Stepper:
         The error estimate forgets its past at `kinks`; `stops` are only landed on.
         """
         problem, history = self.problem, self.history
-        at_kink = any(_same(time, kink) for kink in kinks)
-        to_kink = min(kink for kink in kinks if kink > time and not _same(kink, time)) - time
-        stop = min(stop for stop in [*stops, *kinks] if stop > time and not _same(stop, time))
+        at_kink = any(same_time(time, kink) for kink in kinks)
+        to_kink = min(kink for kink in kinks if kink > time and not same_time(kink, time)) - time
+        stop = min(stop for stop in [*stops, *kinks] if stop > time and not same_time(stop, time))
+        if same_time(stop, kinks[-1]):  # else nothing would be left to step over
+            stop = kinks[-1]
         to_stop = stop - time
         if at_kink or self.wanted is None:
             history.forget()
@@ -331,7 +341,8 @@ def _rms(values: NDArray) -> float:
     return float(np.sqrt(np.mean(values * values)))
 
 
-def _same(a: float, b: float) -> bool:
+def same_time(a: float, b: float) -> bool:
+    """Whether two times [s] differ by round-off only."""
     return abs(a - b) <= 1e-12 * max(1.0, abs(a), abs(b))
 
 

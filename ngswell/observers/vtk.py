@@ -8,6 +8,7 @@ from pathlib import Path
 
 from ngsolve import CF, CoefficientFunction, VTKOutput
 
+from ngswell import checks
 from ngswell.errors import InputError, OutputError
 from ngswell.observers.base import Observer
 from ngswell.problem import Problem
@@ -31,6 +32,12 @@ class VTK(Observer):
         overwrite: bool = False,
     ) -> None:
         super().__init__(when)
+        if not isinstance(path, (str, os.PathLike)) or not Path(path).name:
+            raise InputError(f"VTK: path has to name the series, such as 'out/swelling', got {checks.shown(path)}")
+        for quantity in quantities:
+            checks.name("VTK: a quantity", quantity, "displacement")
+        subdivision = checks.whole("VTK: subdivision", subdivision, 0, 5)
+        checks.flag("VTK: overwrite", overwrite)
         self.path, self.quantities, self.subdivision, self.overwrite = Path(path), quantities, subdivision, overwrite
 
     def start(self, problem: Problem, begin: float, until: float) -> None:
