@@ -6,16 +6,20 @@ Inputs are the same in every run. HYPOTHESIS_PROFILE=fresh draws new ones, FUZZ_
 from __future__ import annotations
 
 import os
+import tempfile
 from collections import Counter
 from dataclasses import fields, is_dataclass
 from decimal import Decimal
 from fractions import Fraction
 from functools import wraps
 from math import inf, isfinite, log, nan
+from pathlib import Path
 
 import numpy as np
+import pytest
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
+from hypothesis.configuration import set_hypothesis_home_dir
 from ngsolve import CF, CoefficientFunction, Mesh, x
 
 from ngswell import Adaptive, Bath, Material, OutputError, Penalty, PowerLaw, Ramp
@@ -24,8 +28,11 @@ from ngswell.errors import InputError
 SCALE = float(os.environ.get("FUZZ_SCALE", "1"))
 FRESH = os.environ.get("HYPOTHESIS_PROFILE") == "fresh"
 
-INPUTS: Counter[str] = Counter()
-"""Inputs that each test has generated."""
+set_hypothesis_home_dir(Path(tempfile.gettempdir()) / "hypothesis")  # nothing is left in the repository
+
+INPUTS: Counter[tuple[str, str]] = Counter()
+WANTED: dict[tuple[str, str], int] = {}
+"""Inputs that each test (module, name) has generated, and is to generate."""
 
 
 def fuzzed(inputs: int, shrink: bool = True, **strategies):
@@ -42,14 +49,27 @@ def fuzzed(inputs: int, shrink: bool = True, **strategies):
     )
 
     def decorate(test):
+        key = test.__module__, test.__name__
+        WANTED[key] = chosen.max_examples
+
         @wraps(test)
         def counted(*arguments, **named):
-            INPUTS[test.__name__] += 1
+            INPUTS[key] += 1
             return test(*arguments, **named)
 
         return chosen(given(**strategies)(counted))
 
     return decorate
+
+
+def generated(module: str) -> int:
+    """How many inputs the tests of a module have generated; skips where some of them did not run."""
+    wanted = {key for key in WANTED if key[0] == module}
+    if not wanted <= set(INPUTS):
+        pytest.skip("only some of the tests ran")
+    total = sum(INPUTS[key] for key in wanted)
+    print(f"{total} generated inputs:", {name: INPUTS[module, name] for _, name in sorted(wanted)})
+    return total
 
 
 def log_uniform(low: float, high: float) -> st.SearchStrategy[float]:
@@ -83,14 +103,18 @@ JUNK = st.one_of(
 """Whatever may be handed over in place of an argument."""
 
 
-def built(make):
-    """What `make` gives, checked for soundness; None if it is refused by a documented exception with a message."""
+def attempt(make):
+    """What `make` gives and an empty message, or None and that of the documented exception."""
     try:
-        thing = make()
+        return make(), ""
     except (InputError, OutputError) as refusal:
-        assert len(str(refusal)) > 10, refusal
-        assert len(str(refusal)) < 500, refusal
-        return None
+        return None, str(refusal)
+
+
+def built(make):
+    """What `make` gives, checked for soundness; None if it is refused with a message of a readable length."""
+    thing, message = attempt(make)
+    assert not message or 10 < len(message) < 500, message
     unsound = fault(thing)
     assert not unsound, f"{thing!r}: {unsound}"
     return thing
