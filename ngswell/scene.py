@@ -28,7 +28,7 @@ from ngswell.quadrature import points, vertices, vertices_of
 from ngswell.schedules import LARGEST, Blend, Ramp
 from ngswell.schemes import BACKWARD_EULER
 from ngswell.solvers import LinearSolver, solver_of
-from ngswell.stepping import Adaptive, Control, Stepper, StepReport, same_time
+from ngswell.stepping import SMALLEST_STEP, Adaptive, Control, Stepper, StepReport, same_time
 from ngswell.supports import Load, Pin, Roller, Support, Symmetry, Traction, Weight
 
 
@@ -341,6 +341,12 @@ class Scene:
             raise InputError(f"until = {until:.17g} s is not a time after the start at {begin:.17g} s")
         control = Adaptive() if steps is None else steps
         checks.instance("steps", control, Control, "Adaptive(tolerance) or Fixed(step)")
+        first = control.first(until - begin, None)
+        if first < SMALLEST_STEP * max(until - begin, abs(begin), abs(until)):
+            raise InputError(
+                f"steps: {control} starts with {first:g} s, which is lost in the round-off of a run from {begin:g} to "
+                f"{until:g} s; take longer steps or a larger tolerance"
+            )
         observers = checks.several("observers", observers, Observer, "observers, such as Probe(...)")
         if newton is not None:
             checks.instance("newton", newton, Newton, "a Newton(...)")

@@ -143,7 +143,7 @@ STUCK, CAREFUL = 0.25, 10
 the step, is taken with backward Euler, as are so many after it: where contents vanish or rates jump."""
 
 SMALLEST_STEP = 1e-12
-"""Steps below this fraction of the interval between two kinks count as none."""
+"""Steps below this fraction of the interval between two kinks, or of the time itself, count as none."""
 
 
 @dataclass
@@ -229,7 +229,7 @@ class Stepper:
                 scheme, last, self.wanted, self._careful = BACKWARD_EULER, None, tried, CAREFUL
             problem.vector[:] = old
             problem.set_time(time)
-            if self.wanted < SMALLEST_STEP * to_kink:
+            if self.wanted < SMALLEST_STEP * max(to_kink, abs(time)):
                 remedy = "Remedies: a gentler ramp, a finer mesh where the field is worst, a weaker penalty."
                 raise StepError(time, dt, field, where, reason, remedy)
         self._slope = self._next_slope
@@ -266,6 +266,7 @@ class Stepper:
         outcome = self._solve(dt)
         if outcome.reason and guess is not None:  # the extrapolation may be what is inadmissible
             problem.vector[:] = old
+            problem.set_time(time)  # the old contents are those with the charge before the step
             problem.begin_step(end, dt)
             outcome = self._solve(dt)
         problem.stages = [(dt, end, problem.vector.copy())]

@@ -5,16 +5,19 @@ A watch ends what takes more than a few steps; what it has seen until then has t
 
 from __future__ import annotations
 
+import secrets
 import signal
 import warnings
 from collections import Counter
 from contextlib import contextmanager
 from dataclasses import dataclass
+from math import exp, log
+from random import Random
 
 import numpy as np
-from fuzzing import fuzzed, generated, log_uniform
-from hypothesis import note
-from hypothesis import strategies as st
+import pytest
+from fuzzing import FRESH, SCALE
+from ngsolve import CF, Integrate, SetNumThreads, ngsglobals
 
 from ngswell import (
     BACKWARD_EULER,
@@ -62,6 +65,9 @@ MOST_STEPS = 8
 LONGEST = 30
 """Seconds after which a run counts as hanging; the slowest take a few."""
 
+LEDGER_BOUND = 1e-8
+"""In units of the body's volume (times the largest concentration): Newton's tolerance. Measured: 4e-11 in hundreds of runs."""
+
 OUTCOMES: Counter[str] = Counter()
 
 
@@ -85,6 +91,15 @@ class Watch(Observer):
             assert problem.inadmissible() is None, f"an accepted state is not admissible: {problem.inadmissible()}"
         if self.count >= MOST_STEPS:
             raise Enough
+
+
+@pytest.fixture(autouse=True)
+def one_thread():
+    """Bodies of four cells gain nothing from threads, and on a busy machine these wait for each other."""
+    threads = ngsglobals.numthreads
+    SetNumThreads(1)
+    yield
+    SetNumThreads(threads)
 
 
 @contextmanager
@@ -122,80 +137,95 @@ TREATMENTS = {
 }  # fmt: skip
 
 
-def between(low: float, high: float, widest: tuple[float, float], wild: bool) -> st.SearchStrategy[float]:
-    """Usual values, or anything in the admissible range."""
-    return log_uniform(*widest) if wild else log_uniform(low, high)
+class Dice:
+    """Random values; the same for the same seed."""
+
+    def __init__(self, seed: int) -> None:
+        self.random = Random(seed)
+
+    def one(self, *choices):
+        return self.random.choice(choices)
+
+    def log(self, low: float, high: float) -> float:
+        """Every order of magnitude alike, the ends now and then."""
+        exponent = self.random.uniform(log(low), log(high))
+        return self.one(low, high) if self.random.random() < 0.1 else min(high, max(low, exp(exponent)))
+
+    def flat(self, low: float, high: float) -> float:
+        return self.random.uniform(low, high)
 
 
-@st.composite
-def trials(draw) -> Trial:
-    wild = draw(st.booleans())
-    model = draw(st.sampled_from([Potential, Potential, Concentration, Concentration, LocalDonnan, Uncharged]))
+def trial_of(seed: int) -> Trial:
+    """Usual parameters or, in half of the trials, any admissible ones; histories with sudden steps and close kinks."""
+    dice = Dice(seed)
+    wild = dice.one(True, False)
+
+    def size_of(low: float, high: float, least: float, most: float) -> float:
+        return dice.log(least, most) if wild else dice.log(low, high)
+
+    model = dice.one(Potential, Potential, Concentration, Concentration, LocalDonnan, Uncharged)
     charged = model is not Uncharged
     material = Material(
-        mu=draw(between(0.01, 10.0, (1e-7, 1e4), wild)),
-        lam=draw(st.one_of(st.just(0.0), between(0.01, 10.0, (1e-7, 1e5), wild))),
-        nS0=draw(st.floats(1e-6, 1 - 1e-6) if wild else st.floats(0.05, 0.8)),
-        cfc0=draw(st.one_of(st.just(0.0), between(0.01, 1.0, (1e-12, 10.0), wild))) if charged else 0.0,
-        D_plus=draw(between(1e-4, 2e-3, (1e-9, 1e-1), wild)),
-        D_minus=draw(between(1e-4, 2e-3, (1e-9, 1e-1), wild)),
-        K=draw(between(1e-5, 1e-1, (1e-11, 1e5), wild)),
-        permeability=draw(st.sampled_from([Constant(), PowerLaw(2.0), HolmesMow(1.0, 2.0)])),
-        diffusivity=draw(st.sampled_from([Constant(), MackieMeares()])),
-        phi=draw(st.sampled_from([1.0, 0.9])),
-        phi_bath=draw(st.sampled_from([1.0, 0.95])),
-        Gamma=draw(st.sampled_from([1.0, 1.1, 0.9])),
+        mu=size_of(0.01, 10.0, 1e-7, 1e4),
+        lam=dice.one(0.0, size_of(0.01, 10.0, 1e-7, 1e5)),
+        nS0=dice.flat(1e-6, 1 - 1e-6) if wild else dice.flat(0.05, 0.8),
+        cfc0=dice.one(0.0, *[size_of(0.01, 1.0, 1e-12, 10.0)] * 3) if charged else 0.0,
+        D_plus=size_of(1e-4, 2e-3, 1e-9, 1e-1),
+        D_minus=size_of(1e-4, 2e-3, 1e-9, 1e-1),
+        K=size_of(1e-5, 1e-1, 1e-11, 1e5),
+        permeability=dice.one(Constant(), PowerLaw(2.0), HolmesMow(1.0, 2.0)),
+        diffusivity=dice.one(Constant(), MackieMeares()),
+        phi=dice.one(1.0, 0.9),
+        phi_bath=dice.one(1.0, 0.95),
+        Gamma=dice.one(1.0, 1.1, 0.9),
     )
-    size = draw(between(0.1, 10.0, (1e-3, 1e3), wild))
+    size = size_of(0.1, 10.0, 1e-3, 1e3)
     stiffness = 2 * material.mu + material.lam + material.RT * material.cfc0
-    tau = size**2 / (material.K * stiffness)
+    tau = min(1e11, max(1e-6, size**2 / (material.K * stiffness)))  # [s]
 
-    def history(values):
-        """A few points within some τ; steps that are nearly sudden, kinks close to each other."""
-        gaps = draw(st.lists(log_uniform(1e-9, 1.0), max_size=3))
-        times = tau * np.cumsum([0.0, *gaps])
-        return Ramp(*zip(times.tolist(), [draw(values) for _ in times], strict=True))
+    def history(values) -> Ramp:
+        times = np.cumsum([0.0, *(tau * dice.log(1e-9, 1.0) for _ in range(dice.one(0, 1, 2, 3)))])
+        return Ramp(*((float(time), values()) for time in np.unique(times)))
 
-    salt = history(between(0.01, 5.0, (1e-9, 10.0), wild)) if charged else None
-    hydraulic = history(st.floats(-1, 1).map(lambda share: float(np.clip(share * material.mu, -1e3, 1e3))))
-    treatment = draw(st.sampled_from(TREATMENTS[model]))
-    bath = Bath("top", c=salt, P=hydraulic if draw(st.booleans()) else 0.0, treatment=treatment)
-    load = draw(st.one_of(st.just(0.0), log_uniform(1e-3, 30.0).map(lambda share: -share), log_uniform(1e-3, 1.0)))
-    load = float(np.clip(load * material.mu, -1e3, 1e3))
-    charge = draw(st.sampled_from([Ramp((0.0, 1.0)), Ramp((0.0, 0.0), (tau, 1.0)), Ramp((0.0, 0.5), (1e-6 * tau, 1.5))]))
-    order = draw(st.sampled_from([2, 2, 3]))
-    if draw(st.integers(0, 3)):
-        cells = draw(st.integers(3, 6))
+    hydraulic = min(material.mu, 1e3)
+    treatment = dice.one(*TREATMENTS[model])
+    bath = Bath(
+        "top",
+        c=history(lambda: size_of(0.01, 5.0, 1e-9, 10.0)) if charged else None,
+        P=history(lambda: dice.flat(-hydraulic, hydraulic)) if dice.one(True, False) else 0.0,
+        treatment=treatment,
+    )
+    load = dice.one(0.0, -dice.log(1e-3, 30.0), dice.log(1e-3, 1.0), -stiffness / material.mu * dice.log(1e-3, 1.0))
+    load = min(1e3, max(-1e3, load * material.mu))
+    charge = dice.one(Ramp((0.0, 1.0)), Ramp((0.0, 0.0), (tau, 1.0)), Ramp((0.0, 0.5), (1e-6 * tau, 1.5)))
+    if dice.one(True, True, True, False):
         geometry = {
-            "mesh": column(size, cells, draw(st.sampled_from([None, {"top": 10.0}]))),
+            "mesh": column(size, dice.one(3, 4, 5, 6), dice.one(None, {"top": 10.0})),
             "kinematics": Confined(),
             "supports": [Roller("bottom", "x")],
             "loads": [Traction("top", (load,))] if load else [],
         }
     else:
-        sides = draw(st.sampled_from(["left", "left|right"]))
         geometry = {
-            "mesh": rectangle(size, draw(log_uniform(0.2, 5.0)) * size, 2, 2, draw(st.booleans())),
+            "mesh": rectangle(size, size * dice.log(0.2, 5.0), 2, 2, dice.one(True, False)),
             "kinematics": PlaneStrain(),
-            "supports": [Roller("bottom", "y"), Roller(sides, "x")],
+            "supports": [Roller("bottom", "y"), Roller(dice.one("left", "left|right"), "x")],
             "loads": [Traction("top", (0.0, load))] if load else [],
         }
-    scene = {**geometry, "material": material, "model": model(order), "baths": [bath], "charge": charge}
-    euler = isinstance(treatment, Lagged) or draw(st.booleans())
-    scheme = BACKWARD_EULER if euler else ESDIRK4
-    until = float(tau * draw(log_uniform(1e-6, 1e3)))
-    if draw(st.booleans()):
-        steps = Fixed(until / draw(st.integers(1, 6)), scheme)
-    else:
-        steps = Adaptive(draw(log_uniform(1e-4, 0.1)), scheme=scheme)
-    return Trial(scene, steps, until, draw(st.booleans()))
+    scene = {**geometry, "material": material, "model": model(dice.one(2, 2, 3)), "baths": [bath], "charge": charge}
+    scheme = BACKWARD_EULER if isinstance(treatment, Lagged) else dice.one(BACKWARD_EULER, ESDIRK4)
+    until = tau * dice.log(1e-6, 1e3)
+    steps = dice.one(Fixed(until / dice.one(1, 2, 3, 4, 5, 6), scheme), Adaptive(dice.log(1e-4, 0.1), scheme=scheme))
+    return Trial(scene, steps, until, dice.one(True, False))
 
 
-@fuzzed(300, shrink=False, trial=trials())
-def test_a_run_ends_soundly(trial):
-    note(repr(trial))
-    outcome = run(trial)
-    OUTCOMES[outcome] += 1
+FIRST = secrets.randbelow(10**9) if FRESH else 0
+SEEDS = range(FIRST, FIRST + round(300 * SCALE))
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_run_ends_soundly(seed):
+    OUTCOMES[run(trial_of(seed))] += 1
 
 
 def run(trial: Trial) -> str:
@@ -219,6 +249,7 @@ def run(trial: Trial) -> str:
     assert np.array_equal(problem.vector, watch.state)
     for name, field in problem.state.outputs().items():
         assert np.isfinite(field(problem._quadrature)).all(), f"{name} is not finite"
+    check_ions(scene)
     if trial.exact:
         check_ledger(scene, ledger)
     return outcome
@@ -238,12 +269,36 @@ WORST: Counter[str] = Counter()
 
 
 def check_ledger(scene: Scene, ledger: Ledger) -> None:
+    """What the nonlinear solves leave, in units of the body's volume and, for ions, of the largest concentration."""
+    problem = scene.problem
+    volume = float(Integrate(CF(1.0), scene.mesh))
+    sizes = {"fluid": volume, "cations": volume * problem.references.get("salt", problem.references.get("c", 1.0))}
     for name, open_by in ledger.imbalance().items():
-        assert np.isfinite(open_by)
-        WORST[name] = max(WORST[name], open_by)
+        held = np.abs(getattr(ledger, name)).max()
+        WORST[name] = max(WORST[name], open_by * held / sizes[name])
+        assert open_by * held / sizes[name] <= LEDGER_BOUND, f"the ledger of {name} is open by {open_by:.3g}"
 
 
-def test_inputs_were_generated():
-    total = generated(__name__)
+def check_ions(scene: Scene) -> None:
+    """Anions are positive by themselves where they follow from c̃ or the bath. As a difference, in `Concentration`, they
+
+    undershoot on cells as coarse as these; c₊ c₋ + cfc(J)²/4 > 0 is what its pressure needs and Newton's method keeps.
+    """
+    problem = scene.problem
+    state, outputs = problem.state, problem.state.outputs()
+    if "c_minus" not in outputs:
+        return
+    where = problem._quadrature
+    plus, minus, charge = (np.asarray(f(where)) for f in (outputs["c_plus"], outputs["c_minus"], state.pointwise_charge))
+    if isinstance(scene.model, Concentration):
+        WORST["anions below zero"] = max(WORST["anions below zero"], -float(minus.min()) / problem.references["c"])
+        assert (plus * minus + charge**2 / 4 > 0).all()
+    else:
+        assert minus.min() > 0
+
+
+def test_most_runs_go_somewhere():
     print(dict(OUTCOMES), dict(WORST))
-    assert OUTCOMES["finished"] + OUTCOMES["enough"] > total / 2
+    if sum(OUTCOMES.values()) < len(SEEDS):
+        pytest.skip("only some of the runs were made, or some failed")
+    assert OUTCOMES["finished"] + OUTCOMES["enough"] > len(SEEDS) / 2
