@@ -66,7 +66,7 @@ LONGEST = 30
 """Seconds after which a run counts as hanging; the slowest take a few."""
 
 LEDGER_BOUND = 1e-8
-"""In units of the body's volume (times the largest concentration): Newton's tolerance. Measured: 4e-11 in hundreds of runs."""
+"""In units of the body's volume (times the largest concentration): Newton's tolerance. Measured: 4e-11 in 600 runs."""
 
 OUTCOMES: Counter[str] = Counter()
 
