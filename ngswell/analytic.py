@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from math import sqrt
 
 from ngswell import checks, donnan
-from ngswell.baths import check_salt
+from ngswell.baths import checked_salt
 from ngswell.errors import InputError
 from ngswell.materials import Material
 
@@ -46,7 +46,7 @@ def homogeneous_equilibrium(
     """
     checks.instance("material", material, Material, "a Material(...)")
     checks.one_of("motion", motion, FREE_DIRECTIONS)
-    check_salt("bath", bath)
+    bath = checked_salt("bath", bath)
     hydraulic = checks.number("hydraulic", hydraulic, "N/mm²", -1e3, 1e3)
     load = checks.number("load", load, "N/mm²", -1e3, 1e3)
     if boundary_charge is not None:

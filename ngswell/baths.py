@@ -157,11 +157,10 @@ Weak: TypeAlias = Penalty | Nitsche | Multiplier
 Treatment: TypeAlias = Weak | Lagged | Frozen | Essential
 
 
-def check_salt(what: str, concentration: object) -> None:
-    """Refuse a salt concentration of a bath [mol/l] beyond the possible."""
-    checks.number(
-        what, concentration, "mol/l", *SALT, hint="for pure water use a small one, such as 1e-6; 1 mol/l = 1000 mol/m³"
-    )
+def checked_salt(what: str, concentration: object) -> float:
+    """A salt concentration of a bath [mol/l] as a float, within the possible."""
+    hint = "for pure water use a small one, such as 1e-6; 1 mol/l = 1000 mol/m³"
+    return checks.number(what, concentration, "mol/l", *SALT, hint=hint)
 
 
 SALT = (1e-12, 10.0)
@@ -185,7 +184,7 @@ class Bath:
     def __post_init__(self) -> None:
         checks.name("a bath's boundary", self.boundary, "top|left")
         for value in () if self.concentration is None else self.concentration.values:
-            check_salt(f"bath on {self.boundary!r}: concentration", value)
+            checked_salt(f"bath on {self.boundary!r}: concentration", value)
         for value in self.pressure.values:
             if not abs(value) <= 1e3:
                 raise InputError(f"bath on {self.boundary!r}: P = {value!r} N/mm² is beyond ±1e3; 1 N/mm² = 1e6 Pa")

@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ngswell import checks
-from ngswell.baths import check_salt
+from ngswell.baths import checked_salt
 from ngswell.errors import InputError
 from ngswell.materials import Material
 
@@ -52,7 +52,7 @@ def _gel(material: Material, bath: float) -> _Gel:
     mu, lam, nS0, cfc0, D_plus, D_minus, K = (
         material.number(name) for name in ("mu", "lam", "nS0", "cfc0", "D_plus", "D_minus", "K")
     )
-    check_salt("bath", bath)
+    bath = checked_salt("bath", bath)
     total = sqrt(4 * bath * bath + cfc0 * cfc0)
     plus = (total + cfc0) / 2
     minus = bath * bath / plus

@@ -120,7 +120,10 @@ class Newton:
                 continue
             solver.contraction = max(rate, solver.contraction or 0.0)
             if damping == 1.0 and left(size(simplified)) <= self.tolerance:
+                tested = vector.copy()
                 vector -= simplified.FV().NumPy()
+                if problem.inadmissible():  # what was tested is, and as good as the tolerance asks
+                    vector[:] = tested
                 return Outcome(count)
             known = damping == 1.0 and self._may_keep(solver)
             renew = not known
