@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import sqrt
 
-from ngswell import donnan
+from ngswell import checks, donnan
+from ngswell.baths import checked_salt
 from ngswell.errors import InputError
 from ngswell.materials import Material
 
@@ -42,36 +44,43 @@ def homogeneous_equilibrium(
     replaces cfc(J) in p_D: a boundary condition that does not follow the deformation.
     Raises InputError for parameters that vary in space and where there is no equilibrium.
     """
-    if motion not in FREE_DIRECTIONS:
-        raise InputError(f"motion {motion!r} is none of {', '.join(FREE_DIRECTIONS)}")
+    checks.instance("material", material, Material, "a Material(...)")
+    checks.one_of("motion", motion, FREE_DIRECTIONS)
+    bath = checked_salt("bath", bath)
+    hydraulic = checks.number("hydraulic", hydraulic, "N/mm²", -1e3, 1e3)
+    load = checks.number("load", load, "N/mm²", -1e3, 1e3)
+    if boundary_charge is not None:
+        boundary_charge = checks.number("boundary_charge", boundary_charge, "mol/l", 0.0, 1e3)
     mu, lam, nS0, cfc0 = (material.number(name) for name in ("mu", "lam", "nS0", "cfc0"))
 
-    def charge(J: float) -> float:
-        return (1 - nS0) * cfc0 / (J - nS0)
+    # Everything follows from the fluid content J − nS0, which J itself does not tell near the compression point.
+    def charge(content: float) -> float:
+        return (1 - nS0) * cfc0 / content
 
-    def pressure(J: float) -> float:
-        cfc, m = charge(J) if boundary_charge is None else boundary_charge, material
+    def pressure(content: float) -> float:
+        cfc, m = charge(content) if boundary_charge is None else boundary_charge, material
         return donnan.pressure(bath, cfc, m.RT, hydraulic, m.Gamma, m.phi, m.phi_bath)
 
-    def excess(J: float) -> float:
-        extra = mu * (J ** (2 / FREE_DIRECTIONS[motion]) - 1)
-        extra += lam * (1 - nS0) ** 2 * (J / (1 - nS0) - J / (J - nS0))
-        return extra - J * (pressure(J) - load)
+    def excess(content: float) -> float:
+        J = nS0 + content
+        extra = mu * (J ** (2 / FREE_DIRECTIONS[motion]) - 1) + lam * (1 - nS0) * J * (J - 1) / content
+        return extra - J * (pressure(content) - load)
 
-    low, high = nS0 * (1 + 1e-12), 1.0
+    low, high = 1e-12 * nS0, 1 - nS0
     if excess(low) > 0:
-        raise InputError("no equilibrium: the body collapses to the compression point, lam = 0 does not resist")
+        raise InputError(
+            f"no equilibrium: under load = {load:g} N/mm² the body collapses to the compression point, which "
+            f"lam = {lam:g} N/mm² does not prevent"
+        )
     while excess(high) < 0:
         high *= 2
         if high > 1e9:
             raise InputError(f"no equilibrium: the body swells without bound in a bath of {bath:g} mol/l")
-    while high - low > 4e-16 * high:
-        middle = (low + high) / 2
-        if middle in (low, high):
-            break
+    while low < (middle := sqrt(low * high) if high > 2 * low else (low + high) / 2) < high:
         low, high = (middle, high) if excess(middle) < 0 else (low, middle)
+    J = nS0 + high
     c = donnan.cations(bath, charge(high) if boundary_charge is None else boundary_charge, material.Gamma)
-    return Equilibrium(high, charge(high), nS0 / high, c, pressure(high))
+    return Equilibrium(J, charge(high), nS0 / J, c, pressure(high))
 
 
 def lagged_column_factor(material: Material, bath: float) -> float:

@@ -11,8 +11,9 @@ from typing import ClassVar, NamedTuple, TypeAlias
 
 from ngsolve import CoefficientFunction
 
+from ngswell import checks
 from ngswell.errors import InputError
-from ngswell.materials import Field, Material, is_number
+from ngswell.materials import Field, Material
 from ngswell.sampling_rules import SamplingRule
 from ngswell.schedules import Schedule, schedule
 
@@ -45,9 +46,8 @@ class Penalty:
     def __post_init__(self) -> None:
         if (self.epsilon is None) == (self.relative is None):
             raise InputError("Penalty takes either epsilon, Penalty(40.0), or relative, Penalty(relative=1e3)")
-        value = self.epsilon if self.epsilon is not None else self.relative
-        if not (is_number(value) and 0 < value < float("inf")):
-            raise InputError(f"Penalty has to be positive and finite, got {value!r}")
+        name = "relative" if self.epsilon is None else "epsilon"
+        checks.settle(self, **{name: checks.positive("Penalty", getattr(self, name))})
 
     def __str__(self) -> str:
         if self.relative is None:
@@ -76,14 +76,14 @@ class Nitsche:
     adjoint: str = "symmetric"
 
     def __post_init__(self) -> None:
-        if self.adjoint not in ("symmetric", "skew", "none"):
-            raise InputError(f"Nitsche: adjoint {self.adjoint!r} is none of 'symmetric', 'skew', 'none'")
+        checks.one_of("Nitsche: adjoint", self.adjoint, ("symmetric", "skew", "none"))
         least = "at least 0" if self.adjoint == "skew" else "positive"
-        inside = is_number(self.gamma) and 0 <= self.gamma < float("inf")
-        if not inside or (self.gamma == 0 and self.adjoint != "skew"):
+        inside = checks.is_number(self.gamma) and 0 <= (gamma := checks.as_float(self.gamma)) < float("inf")
+        if not inside or (gamma == 0 and self.adjoint != "skew"):
             raise InputError(
-                f"Nitsche with adjoint {self.adjoint!r}: gamma has to be {least} and finite, got {self.gamma!r}"
+                f"Nitsche with adjoint {self.adjoint!r}: gamma has to be {least} and finite, got {checks.shown(self.gamma)}"
             )
+        checks.settle(self, gamma=gamma)
 
     def __str__(self) -> str:
         return f"Nitsche, {self.adjoint} adjoint, γ = {self.gamma:g}"
@@ -124,8 +124,10 @@ class Lagged:
     charge_of: ClassVar[str] = "last"
 
     def __post_init__(self) -> None:
-        if self.rule is not None and (isinstance(self.rule, type) or not isinstance(self.rule, SamplingRule)):
-            raise InputError(f"Lagged: rule {self.rule!r} is none of InnerLayer(), Averaged(), LeastSquares(...)")
+        if self.rule is not None and not checks.is_a(self.rule, SamplingRule):
+            raise InputError(
+                f"Lagged: rule {checks.shown(self.rule)} is none of InnerLayer(), Averaged(), LeastSquares(...)"
+            )
 
     def __str__(self) -> str:
         return "prescribed with the charge of the last step" + (f", {self.rule}" if self.rule is not None else "")
@@ -155,13 +157,23 @@ Weak: TypeAlias = Penalty | Nitsche | Multiplier
 Treatment: TypeAlias = Weak | Lagged | Frozen | Essential
 
 
+def checked_salt(what: str, concentration: object) -> float:
+    """A salt concentration of a bath [mol/l] as a float, within the possible."""
+    hint = "for pure water use a small one, such as 1e-6; 1 mol/l = 1000 mol/m³"
+    return checks.number(what, concentration, "mol/l", *SALT, hint=hint)
+
+
+SALT = (1e-12, 10.0)
+"""Salt concentrations that a bath may have [mol/l]. Water itself has 1e-7 of ions."""
+
+
 @dataclass(frozen=True)
 class Bath:
     """A salt bath on a boundary ("top" or "top|left").
 
     `c` is the salt concentration c̄ [mol/l] (none for models without ions), `P` the hydraulic pressure P̄ [N/mm²]; each a
     number or a schedule. Without a `treatment` the model's default applies. Raises InputError for a concentration that is
-    not positive or beyond 10 mol/l.
+    below 1e-12 or beyond 10 mol/l.
     """
 
     boundary: str
@@ -170,28 +182,25 @@ class Bath:
     treatment: Treatment | None = None
 
     def __post_init__(self) -> None:
+        checks.name("a bath's boundary", self.boundary, "top|left")
         for value in () if self.concentration is None else self.concentration.values:
-            if not 0 < value <= 10:
-                raise InputError(
-                    f"bath on {self.boundary!r}: concentration {value:g} mol/l is outside 0 … 10 (0 excluded; "
-                    "for pure water use a small one, such as 1e-6; 1 mol/l = 1000 mol/m³)"
-                )
+            checked_salt(f"bath on {self.boundary!r}: concentration", value)
         for value in self.pressure.values:
             if not abs(value) <= 1e3:
-                raise InputError(f"bath on {self.boundary!r}: P = {value:g} N/mm² is beyond ±1e3; 1 N/mm² = 1e6 Pa")
+                raise InputError(f"bath on {self.boundary!r}: P = {value!r} N/mm² is beyond ±1e3; 1 N/mm² = 1e6 Pa")
         if self.treatment is not None and not isinstance(self.treatment, Treatment):
             raise InputError(
-                f"bath on {self.boundary!r}: treatment {self.treatment!r} is none of "
+                f"bath on {self.boundary!r}: treatment {checks.shown(self.treatment)} is none of "
                 "Penalty(...), Nitsche(), Multiplier(), Lagged(), Frozen(), Essential()"
             )
 
     @property
     def concentration(self) -> Schedule | None:
-        return None if self.c is None else schedule(self.c)
+        return None if self.c is None else schedule(f"bath on {self.boundary!r}: concentration [mol/l]", self.c)
 
     @property
     def pressure(self) -> Schedule:
-        return schedule(self.P)
+        return schedule(f"bath on {self.boundary!r}: P [N/mm²]", self.P)
 
     @property
     def schedules(self) -> list[Schedule]:

@@ -7,11 +7,13 @@ from typing import TYPE_CHECKING
 
 from numpy.typing import NDArray
 
+from ngswell import checks
 from ngswell.baths import Frozen, Lagged
 from ngswell.diagnosis import UNDETERMINED, singular_mode
 from ngswell.errors import InputError, StepError
 from ngswell.newton import Newton, Outcome
 from ngswell.problem import Problem, Snapshot
+from ngswell.schedules import LARGEST
 from ngswell.solvers import LinearSolver, solver_of
 
 if TYPE_CHECKING:
@@ -41,7 +43,7 @@ def equilibrate(
     for fields of position and constrained bodies. Raises InputError for a sealed body (what it holds is not determined by
     balances) and for treatments that remember the past, and StepError when neither way reaches the state of rest.
     """
-    time = scene.start if time is None else time
+    time = scene.start if time is None else checks.number("equilibrate: time", time, "s", -LARGEST, LARGEST)
     if not scene.baths:
         raise InputError("equilibrate: the body is sealed, so its content at rest is not determined; give it a bath")
     for bath in scene.baths:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import pi
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from ngsolve import CF, H1, CoefficientFunction, Cof, FESpace, Grad, Id, IfPos, Mesh, Norm, VectorH1, grad, specialcf, x
@@ -14,6 +14,7 @@ from ngswell.errors import InputError
 from ngswell.quadrature import vertices, vertices_of
 
 
+@runtime_checkable
 class Kinematics(Protocol):
     """The displacement's part of a scene. `directions` names its components, as supports do.
 

@@ -22,6 +22,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ngswell import checks
+from ngswell.baths import checked_salt
 from ngswell.errors import InputError
 from ngswell.materials import Material
 
@@ -50,8 +52,7 @@ def _gel(material: Material, bath: float) -> _Gel:
     mu, lam, nS0, cfc0, D_plus, D_minus, K = (
         material.number(name) for name in ("mu", "lam", "nS0", "cfc0", "D_plus", "D_minus", "K")
     )
-    if not 0 < bath <= 10:
-        raise InputError(f"bath of {bath!r} mol/l is outside 0 … 10 (0 excluded): give the concentration c̄ in mol/l")
+    bath = checked_salt("bath", bath)
     total = sqrt(4 * bath * bath + cfc0 * cfc0)
     plus = (total + cfc0) / 2
     minus = bath * bath / plus
@@ -105,8 +106,8 @@ def penalty_efflux(material: Material, bath: float, relative: float, cell: float
 
     at the same charge p − p_D = P + b Σ and c − c_D = b Σ/(2 Rθ).
     """
-    _positive("relative", relative)
-    _positive("cell", cell)
+    checks.positive("relative", relative)
+    checks.positive("cell", cell)
     g = _gel(material, bath)
     return relative / cell * np.array([[g.K, g.K * g.share], [0.0, g.D_plus * g.share / (2 * g.RT)]])
 
@@ -126,7 +127,7 @@ def uniform_gel_fluxes(
     `salt` [mol/l] and `hydraulic` [N/mm²] are the differences of the bath that fluxes point away from less that of the
     other, `thickness` their distance [mm]:  L (P, Σ)/thickness.
     """
-    _positive("thickness", thickness)
+    checks.positive("thickness", thickness)
     fluid, cations = conductance(material, bath) @ potentials(material, bath, salt, hydraulic) / thickness
     return float(fluid), float(cations)
 
@@ -145,7 +146,7 @@ class LinearColumn:
 
     def __post_init__(self) -> None:
         _gel(self.material, self.bath)
-        _positive("height", self.height)
+        checks.positive("height", self.height)
 
     @cached_property
     def storage(self) -> NDArray:
@@ -219,7 +220,7 @@ class LinearColumn:
         if not (times > 0).all():
             raise InputError(f"time = {times.min():g} s: the series holds after the change of the bath, give times > 0")
         if step is not None:
-            _positive("step", step)
+            checks.positive("step", step)
             count = np.round(times / step)
             if not np.allclose(count * step, times, rtol=1e-9):
                 raise InputError(f"time: with step = {step:g} s, give multiples of it")
@@ -234,8 +235,3 @@ class LinearColumn:
         target = potentials(self.material, self.bath, salt, hydraulic)
         modes = self._modes[1]
         return row @ target - (row @ modes * (modes.T @ self.storage @ target)) @ left
-
-
-def _positive(name: str, value: float) -> None:
-    if not 0 < value < float("inf"):
-        raise InputError(f"{name} has to be positive and finite, got {value!r}")

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from typing import Any, NamedTuple, Protocol, TypeAlias, TypeGuard
+from math import inf
+from typing import Any, NamedTuple, Protocol, TypeAlias
 
-import numpy as np
-from ngsolve import VOL, CoefficientFunction, Mesh, exp
+from ngsolve import CF, VOL, CoefficientFunction, Mesh, exp
 
+from ngswell import checks
 from ngswell.errors import InputError
 from ngswell.quadrature import points
 
@@ -29,7 +30,7 @@ class _Range(NamedTuple):
 _RANGES = {
     "mu": _Range(1e-7, 1e4, "N/mm²", "1 N/mm² = 1 MPa = 1e6 Pa"),
     "lam": _Range(1e-7, 1e5, "N/mm²", "1 N/mm² = 1 MPa = 1e6 Pa", zero=True),
-    "nS0": _Range(0.0, 1.0, "(a volume fraction)", "it lies strictly between 0 and 1"),
+    "nS0": _Range(1e-6, 1 - 1e-6, "(a volume fraction)", "it lies strictly between 0 and 1"),
     "cfc0": _Range(1e-12, 10.0, "mol/l", "1 mol/l = 1 meq/ml = 1000 mol/m³", zero=True),
     "D_plus": _Range(1e-9, 1e-1, "mm²/s", "1 mm²/s = 1e-6 m²/s; salt in water has about 1e-3 mm²/s"),
     "D_minus": _Range(1e-9, 1e-1, "mm²/s", "1 mm²/s = 1e-6 m²/s; salt in water has about 1e-3 mm²/s"),
@@ -81,7 +82,7 @@ class PowerLaw:
     m: float
 
     def __post_init__(self) -> None:
-        _check("m", self.m)
+        checks.settle(self, m=_checked("m", self.m))
 
     def __call__(self, K0: Field, J: Field, nS0: Field) -> Field:
         return K0 * void_ratio(J, nS0) ** self.m
@@ -98,8 +99,7 @@ class HolmesMow:
     M: float
 
     def __post_init__(self) -> None:
-        _check("alpha", self.alpha)
-        _check("M", self.M)
+        checks.settle(self, alpha=_checked("alpha", self.alpha), M=_checked("M", self.M))
 
     def __call__(self, K0: Field, J: Field, nS0: Field) -> Field:
         return K0 * void_ratio(J, nS0) ** self.alpha * exp(self.M / 2 * (J * J - 1))
@@ -147,9 +147,13 @@ class Material:
 
     def __post_init__(self) -> None:
         reference = _sample("permeability", self.permeability, (1.0, 1.0, 0.5), "K(K0, J, nS0) such as PowerLaw(m=2.0)")
-        if abs(reference - 1) > 1e-12:
+        if not abs(reference - 1) <= 1e-12:
             raise InputError(f"permeability = {self.permeability!r} gives K = {reference:g} K0 at J = 1; it has to give K0")
-        _sample("diffusivity", self.diffusivity, (1.0, 0.5), "D(D0, nF) such as MackieMeares()")
+        diffusivity = _sample("diffusivity", self.diffusivity, (1.0, 0.5), "D(D0, nF) such as MackieMeares()")
+        if not 0 < diffusivity < inf:
+            raise InputError(
+                f"diffusivity = {self.diffusivity!r} gives D = {diffusivity:g} D0 at nF = 0.5; it has to be positive"
+            )
         for field in fields(self):
             value = getattr(self, field.name)
             if field.name in ("permeability", "diffusivity"):
@@ -157,10 +161,9 @@ class Material:
             if isinstance(value, CoefficientFunction):
                 if field.name in _ONE_NUMBER:
                     raise InputError(_ONE_NUMBER[field.name])
-                if value.dim != 1:
-                    raise InputError(f"{field.name} has to be scalar, got a CoefficientFunction of {value.dim} components")
+                check_scalar(field.name, value)
             else:
-                _check(field.name, value)
+                checks.settle(self, **{field.name: _checked(field.name, value)})
 
     @property
     def RT(self) -> float:
@@ -186,8 +189,8 @@ class Material:
             value = getattr(self, field.name)
             if isinstance(value, CoefficientFunction):
                 samples = value(where).ravel()
-                _check(field.name, float(samples.min()))
-                _check(field.name, float(samples.max()))
+                _checked(field.name, float(samples.min()))
+                _checked(field.name, float(samples.max()))
 
     def largest(self, name: str, mesh: Mesh) -> float:
         """Largest value of the parameter `name` over the quadrature points of `mesh`, in the parameter's unit."""
@@ -196,26 +199,30 @@ class Material:
 
 
 def _sample(name: str, law: Any, arguments: tuple[float, ...], example: str) -> float:
-    """Value of a law, refused if it is none."""
+    """Value of a law, refused if it is none: it has to take numbers and fields."""
     try:
+        law(*(CF(value) for value in arguments))
         return float(law(*arguments))
-    except TypeError:
-        raise InputError(f"{name} = {law!r} is not a law {example}") from None
+    except (TypeError, ValueError, ArithmeticError, AttributeError) as error:
+        raise InputError(f"{name} = {checks.shown(law)} is not a law {example} of numbers and of fields: {error}") from None
 
 
-def is_number(value: object) -> TypeGuard[float]:
-    """Whether a parameter is one real number, Python's or numpy's, and no truth value."""
-    return isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
+def check_scalar(name: str, field: CoefficientFunction) -> None:
+    """Refuse fields of vectors and of complex numbers."""
+    if field.dim != 1 or field.is_complex:
+        kind = "complex values" if field.is_complex else f"{field.dim} components"
+        raise InputError(f"{name} has to be scalar and real, got a CoefficientFunction of {kind}")
 
 
-def _check(name: str, value: object) -> None:
+def _checked(name: str, value: object) -> float:
+    """A parameter as a float, within its range."""
     low, high, unit, hint, zero = _RANGES[name]
-    if not is_number(value):
-        raise InputError(f"{name} has to be a number or a CoefficientFunction, got {value!r}")
-    number = float(value)
-    inside = low < number < high if name == "nS0" else low <= number <= high
-    if not (inside or (zero and number == 0.0)):
-        raise InputError(f"{name} = {number:g} {unit} is outside {low:g} … {high:g}{' or 0' if zero else ''}: {hint}")
+    if not checks.is_number(value):
+        raise InputError(f"{name} has to be a number or a CoefficientFunction, got {checks.shown(value)}")
+    number = checks.as_float(value)
+    if not (low <= number <= high or (zero and number == 0.0)):
+        raise InputError(f"{name} = {number!r} {unit} is outside {low:g} … {high:g}{' or 0' if zero else ''}: {hint}")
+    return number
 
 
 TABLE_1 = Material(mu=0.24, lam=0.02, nS0=0.25, cfc0=0.2, D_plus=0.5e-3, D_minus=0.8e-3, K=1.07e-3)

@@ -3,19 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from math import isfinite, log
+from math import log, prod
 from typing import Any
 
 import numpy as np
-from netgen.occ import OCCGeometry
+from netgen.occ import OCCGeometry, TopoDS_Shape
 from ngsolve import ET, VOL, ElementId, IntegrationRule, Mesh, specialcf
 from ngsolve.meshes import Make1DMesh, MakeStructured2DMesh, MakeStructured3DMesh
 from numpy.typing import NDArray
 
+from ngswell import checks
 from ngswell.errors import InputError
 
 Grade = dict[str, float]
 """Boundary name → how many times thinner the cell at that boundary is than the largest of its row [-]."""
+
+SIZES = (1e-6, 1e6)
+"""Sizes that a body may have [mm]."""
+
+MOST_CELLS = 10**7
+"""Cells that a mesh may have."""
 
 _CELLS = {
     1: {"segment": ET.SEGM},
@@ -42,7 +49,7 @@ def column(height: float, cells: int, grade: Grade | None = None) -> Mesh:
     `grade={"top": 10}` thins the cells in a geometric progression: the one at the top has a tenth of the length of the
     largest, at the bottom. Towards both ends, the largest is in the middle.
     """
-    _check_sizes("column", (height,), (cells,))
+    (height,), (cells,) = _checked_sizes("column", (height,), (cells,))
     (nodes,) = _graded("column", (height,), (cells,), (("bottom", "top"),), grade)
     mesh = Make1DMesh(cells, mapping=lambda s: nodes[round(cells * s)])
     for number, name in enumerate(("bottom", "top")):
@@ -65,16 +72,16 @@ def rectangle(
     `lines={"x": 0.3}` shifts the cells so that a mesh line lies at x = 0.3 mm: where baths or materials bend within a
     cell, no order helps.
     """
-    _check_sizes("rectangle", (width, height), (nx, ny))
+    (width, height), (nx, ny) = _checked_sizes("rectangle", (width, height), (nx, ny))
+    checks.flag("rectangle: triangles", triangles)
     xs, ys = _graded("rectangle", (width, height), (nx, ny), (("left", "right"), ("bottom", "top")), grade)
-    for axis, place in (lines or {}).items():
-        if axis not in ("x", "y"):
-            raise InputError(f"rectangle: lines names {axis!r}, which is none of x, y")
+    for axis, place in _by_name("rectangle: lines", lines, {"x": 0.3}):
+        checks.one_of("rectangle: lines: axis", axis, ("x", "y"))
         nodes = xs if axis == "x" else ys
-        if not 0 < place < nodes[-1] or len(nodes) < 3:
+        if not (checks.is_number(place) and 0 < place < nodes[-1] and len(nodes) >= 3):
             raise InputError(
-                f"rectangle: lines = {{{axis!r}: {place!r}}} mm needs two cells or more in {axis} and a place between 0 and "
-                f"{nodes[-1]:g}"
+                f"rectangle: lines = {{{axis!r}: {checks.shown(place)}}} mm needs two cells or more in {axis} and a place "
+                f"between 0 and {nodes[-1]:g}"
             )
         nodes[:] = _shifted(nodes, place)
     return MakeStructured2DMesh(
@@ -97,9 +104,8 @@ def box(
     Boundaries: "left" (x = 0) and "right", "front" (y = 0) and "back", "bottom" (z = 0) and "top". `cells` are "hexahedra",
     or two "prisms" (triangles in x and y, extruded in z) or six "tetrahedra" in each. `grade` as in `column`.
     """
-    if cells not in ("hexahedra", "prisms", "tetrahedra"):
-        raise InputError(f"box: cells {cells!r} are none of hexahedra, prisms, tetrahedra")
-    _check_sizes("box", (width, depth, height), (nx, ny, nz))
+    checks.one_of("box: cells", cells, ("hexahedra", "prisms", "tetrahedra"))
+    (width, depth, height), (nx, ny, nz) = _checked_sizes("box", (width, depth, height), (nx, ny, nz))
     sides = (("left", "right"), ("front", "back"), ("bottom", "top"))
     xs, ys, zs = _graded("box", (width, depth, height), (nx, ny, nz), sides, grade)
     mesh = MakeStructured3DMesh(
@@ -127,10 +133,10 @@ def from_occ(shape: Any, maxh: float, order: int = 1, quads: bool = False) -> Me
         disc.edges.name = "rim"
         mesh = from_occ(disc, maxh=0.5, order=2)
     """
-    if not (isfinite(maxh) and maxh > 0):
-        raise InputError(f"from_occ: maxh = {maxh!r} mm has to be positive")
-    if not (isinstance(order, int) and 1 <= order <= 10):
-        raise InputError(f"from_occ: order {order!r} of the curved sides is not one of 1, 2, … 10")
+    maxh = checks.positive("from_occ: maxh", maxh, "mm")
+    order = checks.whole("from_occ: order of the curved sides", order, 1, 10)
+    checks.flag("from_occ: quads", quads)
+    checks.instance("from_occ: shape", shape, TopoDS_Shape, "a shape of netgen.occ, such as Rectangle(1.0, 2.0).Face()")
     solid = len(shape.solids) > 0
     if solid and quads:
         raise InputError("from_occ: a solid is meshed with tetrahedra; quads is for faces")
@@ -194,26 +200,37 @@ def check_plane(what: str, heights: NDArray) -> None:
         raise InputError(f"{what}: a 2-d body lies in the plane z = 0, this one reaches z = {highest:g} mm")
 
 
-def _check_sizes(what: str, sizes: tuple[float, ...], cells: tuple[int, ...]) -> None:
-    if not all(isfinite(size) and size > 0 for size in sizes):
-        raise InputError(f"{what}: sizes have to be positive and finite, got {sizes} mm")
-    if not all(isinstance(number, (int, np.integer)) and number > 0 for number in cells):
-        raise InputError(f"{what}: numbers of cells have to be positive integers, got {cells}")
+def _checked_sizes(what: str, sizes: tuple[float, ...], cells: tuple[int, ...]) -> tuple[list[float], list[int]]:
+    """Sizes [mm] as floats and numbers of cells as ints, neither beyond what a body can mean or a memory can hold."""
+    lengths = [checks.number(f"{what}: size", size, "mm", *SIZES) for size in sizes]
+    numbers = [checks.whole(f"{what}: number of cells", number, 1, MOST_CELLS) for number in cells]
+    if prod(numbers) > MOST_CELLS:
+        raise InputError(f"{what}: {' × '.join(map(str, numbers))} cells are more than {MOST_CELLS}; take fewer")
+    return lengths, numbers
+
+
+def _by_name(what: str, values: Any, example: dict[str, float]) -> list[tuple[Any, Any]]:
+    """The entries of a dictionary, none for None."""
+    if values is None:
+        return []
+    if not isinstance(values, dict):
+        raise InputError(f"{what} has to be a dictionary, such as {example}, got {checks.shown(values)}")
+    return list(values.items())
 
 
 def _graded(
     what: str, sizes: tuple[float, ...], cells: tuple[int, ...], sides: tuple[tuple[str, str], ...], grade: Grade | None
 ) -> list[list[float]]:
     """Node coordinates [mm] along each axis, whose two ends are named in `sides`."""
-    grade = grade or {}
     names = [name for pair in sides for name in pair]
-    for name, ratio in grade.items():
-        if name not in names:
-            raise InputError(f"{what}: grade names {name!r}, which is none of {', '.join(names)}")
-        if not 1 <= ratio <= 1e6:
-            raise InputError(f"{what}: grade {ratio!r} at {name!r} is outside 1 … 1e6; it is largest over smallest cell")
+    ratios = dict.fromkeys(names, 1.0)
+    for name, ratio in _by_name(f"{what}: grade", grade, {names[-1]: 10.0}):
+        checks.one_of(f"{what}: grade: boundary", name, names)
+        ratios[name] = checks.number(
+            f"{what}: grade at {name!r}", ratio, low=1.0, high=1e6, hint="it is largest over smallest cell"
+        )
     return [
-        _nodes(size, number, grade.get(low, 1.0), grade.get(high, 1.0))
+        _nodes(size, number, ratios[low], ratios[high])
         for size, number, (low, high) in zip(sizes, cells, sides, strict=True)
     ]
 

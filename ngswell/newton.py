@@ -8,6 +8,7 @@ from math import inf
 import numpy as np
 from ngsolve import BaseVector
 
+from ngswell import checks
 from ngswell.problem import Problem
 from ngswell.solvers import LinearSolver
 
@@ -58,6 +59,15 @@ class Newton:
     most_iterations: int = 15
     least_damping: float = 1 / 64
     slowest: float = 0.0
+
+    def __post_init__(self) -> None:
+        checks.settle(
+            self,
+            tolerance=checks.number("Newton: tolerance", self.tolerance, low=1e-16, high=1.0),
+            most_iterations=checks.whole("Newton: most_iterations", self.most_iterations, 1, 1000),
+            least_damping=checks.number("Newton: least_damping", self.least_damping, low=1e-10, high=1.0),
+            slowest=checks.number("Newton: slowest", self.slowest, low=0.0, high=0.99, hint="0 renews every matrix"),
+        )
 
     def solve(self, problem: Problem, solver: LinearSolver) -> Outcome:
         """Iterate from the fields of `problem`, in place."""

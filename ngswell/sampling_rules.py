@@ -10,13 +10,13 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations_with_replacement
-from math import isfinite
 from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 from ngsolve import BND, H1, VOL, CoefficientFunction, GridFunction, LinearForm, Mesh, ds
 from numpy.typing import NDArray
 
+from ngswell import checks
 from ngswell.errors import InputError
 from ngswell.quadrature import vertices_of
 
@@ -168,12 +168,13 @@ class LeastSquares:
     weights: tuple[float, float] = (1.0, 1.0)
 
     def __post_init__(self) -> None:
-        if not (isinstance(self.degree, int) and not isinstance(self.degree, bool) and 0 <= self.degree <= 6):
-            raise InputError(f"LeastSquares: degree {self.degree!r} is not one of 0, 1, … 6")
-        if not (isinstance(self.weights, tuple) and len(self.weights) == 2):
-            raise InputError(f"LeastSquares: weights {self.weights!r} have to be two numbers, (for p, for c)")
-        if not (all(isfinite(w) and w >= 0 for w in self.weights) and any(self.weights)):
-            raise InputError(f"LeastSquares: weights {self.weights!r} have to be finite, not negative, and not both 0")
+        checks.settle(self, degree=checks.whole("LeastSquares: degree", self.degree, 0, 6))
+        weights = checks.vector("LeastSquares: weights", self.weights, 1e12, "mm⁴/N² or l²/mol²")
+        if len(weights) != 2:
+            raise InputError(f"LeastSquares: weights {weights!r} have to be two numbers, (for p, for c)")
+        if min(weights) < 0 or not any(weights):
+            raise InputError(f"LeastSquares: weights {weights!r} have to be finite, not negative, and not both 0")
+        checks.settle(self, weights=weights)
 
     def __str__(self) -> str:
         return f"by a polynomial of degree {self.degree} along the bath (least squares)"

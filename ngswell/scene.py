@@ -6,7 +6,6 @@ import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from math import inf
 from time import perf_counter
 
 import numpy as np
@@ -14,7 +13,9 @@ from ngsolve import CoefficientFunction, FESpace, Mesh, TaskManager, specialcf
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
+from ngswell import checks
 from ngswell.baths import Bath, Lagged, Multiplier, Treatment, Weak
+from ngswell.checks import shown
 from ngswell.diagnosis import cannot_change_volume, connected_parts, free_motion
 from ngswell.equilibrium import equilibrate
 from ngswell.errors import InputError
@@ -28,10 +29,10 @@ from ngswell.observers.checkpoint import Checkpoint, Signals, Stopped
 from ngswell.problem import Problem, Snapshot
 from ngswell.quadrature import points, vertices, vertices_of
 from ngswell.restart import Restart, parts, text_of, versions
-from ngswell.schedules import Ramp
+from ngswell.schedules import LARGEST, Blend, Ramp
 from ngswell.schemes import BACKWARD_EULER
 from ngswell.solvers import LinearSolver, solver_of
-from ngswell.stepping import Adaptive, Control, Stepper, StepReport
+from ngswell.stepping import SMALLEST_STEP, Adaptive, Control, Stepper, StepReport, same_time
 from ngswell.supports import Load, Pin, Roller, Support, Symmetry, Traction, Weight
 
 
@@ -77,6 +78,7 @@ class Scene:
     initial: tuple[float | None, float] | None = None
 
     def __post_init__(self) -> None:
+        self._check_kinds()
         if self.kinematics.dimension != self.mesh.dim:
             raise InputError(
                 f"{type(self.kinematics).__name__} needs a {self.kinematics.dimension}-d mesh, this one is {self.mesh.dim}-d"
@@ -86,11 +88,37 @@ class Scene:
         self.model.check(self.material, self.baths)
         for value in self.charge.values:
             if not 0 <= value <= 100:
-                raise InputError(f"charge factor {value:g} is outside 0 … 100; it multiplies cfc0")
+                raise InputError(f"charge factor {value!r} is outside 0 … 100; it multiplies cfc0")
         self._check_baths()
         self._check_supports()
         self._check_loads()
         self.initial_bath()
+
+    def _check_kinds(self) -> None:
+        """Refuse pieces that are none of their kind; lists become tuples."""
+        checks.instance("mesh", self.mesh, Mesh, "a mesh of NGSolve, as column, rectangle, box, from_occ and read_mesh make")
+        motions = "Confined(), PlaneStrain(), Axisymmetric() or Solid()"
+        checks.instance("kinematics", self.kinematics, Kinematics, motions)
+        checks.instance("material", self.material, Material, "a Material(...)")
+        models = "Potential(), Concentration(), LocalDonnan() or Uncharged()"
+        checks.instance("model", self.model, Model, models)
+        checks.instance("charge", self.charge, Ramp, "a Ramp of factors on cfc0, such as Ramp((0, 0.0), (4000, 1.0))")
+        checks.settle(
+            self,
+            supports=checks.several("supports", self.supports, Support, "Roller, Symmetry or Pin"),
+            baths=checks.several("baths", self.baths, Bath, "Bath(...)"),
+            loads=checks.several("loads", self.loads, Load, "Traction or Weight"),
+            start=checks.number("start", self.start, "s", -LARGEST, LARGEST),
+        )
+        if self.initial is not None:
+            initial = checks.entries(self.initial)
+            if initial is None or len(initial) != 2:
+                pair = "(concentration [mol/l], hydraulic pressure [N/mm²])"
+                raise InputError(f"initial has to be {pair}, got {shown(self.initial)}")
+            salt, hydraulic = initial
+            if salt is not None:
+                salt = checks.number("initial: concentration", salt, "mol/l")
+            checks.settle(self, initial=(salt, checks.number("initial: hydraulic pressure", hydraulic, "N/mm²")))
 
     # -- checks --------------------------------------------------------------------------------------------------------
 
@@ -116,6 +144,9 @@ class Scene:
                 if name in held:
                     raise InputError(f"bath on {bath.boundary!r}: boundary {name!r} already has a bath")
                 held.add(name)
+            for history in bath.schedules:
+                if isinstance(history, Blend):
+                    history.check_on(points(self.mesh, self.mesh.Boundaries(bath.boundary), 4))
             if not isinstance(self.treatment(bath), self.model.treatments):
                 choices = ", ".join(t.__name__ for t in self.model.treatments)
                 model = type(self.model).__name__
@@ -337,15 +368,32 @@ class Scene:
         succeeds. However a run ends, the problem's fields hold the last accepted state; with a `Checkpoint` among the
         observers, Ctrl-C and SIGTERM end it after the present step.
         """
+        if resume is not None:
+            checks.instance(
+                "resume", resume, (Snapshot, Restart), "a snapshot, such as `end` of an earlier result, or a checkpoint"
+            )
         restart = resume if isinstance(resume, Restart) else None
         state = resume.snapshot if isinstance(resume, Restart) else resume
         time = self.start if state is None else state.time
         begin = time if restart is None else restart.begin
-        if not begin < until < inf:
-            raise InputError(f"until = {until:g} s is not a time after the start at {begin:g} s")
+        until = checks.number("until", until, "s", -LARGEST, LARGEST)
+        if not begin < until or same_time(begin, until):
+            raise InputError(f"until = {until:.17g} s is not a time after the start at {begin:.17g} s")
         if not time <= until:
             raise InputError(f"until = {until:g} s is before the checkpoint, {time:g} s")
         control = Adaptive() if steps is None else steps
+        checks.instance("steps", control, Control, "Adaptive(tolerance) or Fixed(step)")
+        first = control.first(until - begin, None)
+        if first < SMALLEST_STEP * max(until - begin, abs(begin), abs(until)):
+            raise InputError(
+                f"steps: {control} starts with {first:g} s, which is lost in the round-off of a run from {begin:g} to "
+                f"{until:g} s; take longer steps or a larger tolerance"
+            )
+        observers = checks.several("observers", observers, Observer, "observers, such as Probe(...)")
+        if newton is not None:
+            checks.instance("newton", newton, Newton, "a Newton(...)")
+        if not callable(solver):
+            raise InputError(f"solver has to make a linear solver of a problem, such as TwoLevelSolver, got {shown(solver)}")
         self._check_scheme(control)
         checkpoints = [observer for observer in observers if isinstance(observer, Checkpoint)]
         observers = [*(o for o in observers if not isinstance(o, Checkpoint)), *checkpoints]  # these see the others' records
@@ -382,7 +430,9 @@ class Scene:
                     else:
                         observer.start(problem, time, until)
                     started.append(observer)
-                stepper = Stepper(problem, control, newton or control.newton, solver(problem))
+                linear = solver(problem)
+                checks.instance("what solver makes", linear, LinearSolver, "a LinearSolver, as TwoLevelSolver")
+                stepper = Stepper(problem, control, newton or control.newton, linear)
                 method = text_of((control, stepper.newton, type(stepper.solver).__name__, stepper.solver.name))
                 if restart is not None:
                     stepper.remember(restart.stepper, same=restart.method == method)

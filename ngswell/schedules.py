@@ -5,16 +5,22 @@ A schedule is a plain value. A run turns it into a `Signal`: an NGSolve field wh
 
 from __future__ import annotations
 
-import math
 from bisect import bisect_right
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Protocol
+from typing import Protocol, cast, runtime_checkable
 
+import numpy as np
 from ngsolve import CoefficientFunction, Parameter
+from numpy.typing import NDArray
 
+from ngswell import checks
 from ngswell.errors import InputError
+from ngswell.materials import Field, check_scalar
+
+LARGEST = 1e15
+"""Times and values beyond this are none that a history can mean."""
 
 
 @dataclass(frozen=True)
@@ -25,6 +31,7 @@ class Signal:
     set: Callable[[float], None]
 
 
+@runtime_checkable
 class Schedule(Protocol):
     """A value over time: the times at which it bends [s], all values it passes, and its form in a run."""
 
@@ -52,9 +59,11 @@ class Ramp:
     def __init__(self, *points: tuple[float, float]) -> None:
         if not points:
             raise InputError("Ramp needs at least one (time, value) point")
-        times, values = (tuple(float(x) for x in column) for column in zip(*points, strict=True))
-        if not all(math.isfinite(x) for x in times + values):
-            raise InputError(f"Ramp has a time or value that is not finite: {points}")
+        pairs = [checks.vector("Ramp: a (time, value) point", point, LARGEST) for point in points]
+        for pair in pairs:
+            if len(pair) != 2:
+                raise InputError(f"Ramp takes points (time, value), Ramp((0, 1.0), (60, 2.0)), got {checks.shown(pair)}")
+        times, values = (tuple(column) for column in zip(*pairs, strict=True))
         for before, after in pairwise(times):
             if after <= before:
                 raise InputError(f"Ramp times have to increase, but {after:g} s follows {before:g} s")
@@ -84,7 +93,22 @@ class Blend:
 
     first: Ramp
     second: Ramp
-    weight: CoefficientFunction
+    weight: Field
+
+    def __post_init__(self) -> None:
+        for history in (self.first, self.second):
+            checks.instance("Blend: a history", history, Ramp, "a Ramp, such as Ramp((0, 0.15))")
+        if isinstance(self.weight, CoefficientFunction):
+            check_scalar("Blend: weight", self.weight)
+        else:
+            checks.settle(self, weight=checks.number("Blend: weight", self.weight, low=0.0, high=1.0))
+
+    def check_on(self, where: NDArray) -> None:
+        """Refuse a weight that leaves [0, 1] at the mesh points `where`, by more than round-off."""
+        if isinstance(self.weight, CoefficientFunction):
+            weights = np.asarray(self.weight(where)).ravel()
+            for weight in (weights.min(), weights.max()):
+                checks.number("Blend: weight", float(weight), low=-1e-9, high=1 + 1e-9)
 
     @property
     def kinks(self) -> tuple[float, ...]:
@@ -109,6 +133,8 @@ class Blend:
         return Signal((1 - self.weight) * first.field + self.weight * second.field, move)
 
 
-def schedule(value: float | Schedule) -> Schedule:
-    """A number as a constant Ramp; schedules pass through."""
-    return Ramp((0.0, float(value))) if isinstance(value, (int, float)) else value
+def schedule(what: str, value: float | Schedule) -> Schedule:
+    """A number as a constant Ramp; schedules pass through. InputError for `what` is neither."""
+    if checks.is_a(value, Schedule):
+        return cast(Schedule, value)
+    return Ramp((0.0, checks.number(what, value, hint="or a history, Ramp(...) or Blend(...)")))

@@ -11,6 +11,7 @@ import numpy as np
 from ngsolve import BilinearForm, Grad, GridFunction, InnerProduct, Integrate, Parameter, dx
 from numpy.typing import NDArray
 
+from ngswell import checks
 from ngswell.errors import InputError, NgswellError
 from ngswell.newton import Newton
 from ngswell.problem import Problem, Snapshot
@@ -68,8 +69,7 @@ def growth_factor(
     The problem's fields stay as they were. Raises InputError for what cannot be meant, and NgswellError when the step or
     the iteration does not succeed.
     """
-    if not 0 < dt < float("inf"):
-        raise InputError(f"dt has to be positive and finite, got {dt!r} s")
+    dt = checks.positive("dt", dt, "s")
     problem = scene.problem
     if state is not None and state.values.shape != problem.vector.shape:
         raise InputError(f"state: the snapshot has {state.values.size} unknowns, the scene {problem.vector.size}")

@@ -6,11 +6,12 @@ from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import inf
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ngswell import checks
 from ngswell.diagnosis import UNDETERMINED, singular_mode
 from ngswell.errors import InputError, StepError
 from ngswell.newton import LOST, Newton, Outcome
@@ -30,6 +31,7 @@ class StepReport:
     error: float | None = None
 
 
+@runtime_checkable
 class Control(Protocol):
     """Chooses the scheme, how its equations are solved, and step sizes [s]."""
 
@@ -58,7 +60,8 @@ class Fixed:
     scheme: Scheme = BACKWARD_EULER
 
     def __post_init__(self) -> None:
-        _positive("Fixed step", self.step, "s")
+        checks.settle(self, step=checks.positive("Fixed step", self.step, "s"))
+        check_scheme("Fixed", self.scheme)
 
     @property
     def newton(self) -> Newton:
@@ -88,8 +91,13 @@ class Adaptive:
     scheme: Scheme = ESDIRK4
 
     def __post_init__(self) -> None:
-        _positive("Adaptive tolerance", self.tolerance, "")
-        _positive("Adaptive largest", self.largest, "s")
+        tolerance = checks.positive("Adaptive tolerance", self.tolerance)
+        if tolerance > 1:
+            raise InputError(f"Adaptive tolerance = {tolerance:g} is above 1: errors are relative to the changes, take 1e-3")
+        checks.settle(self, tolerance=tolerance)
+        if not (checks.is_number(self.largest) and self.largest == inf):
+            checks.settle(self, largest=checks.positive("Adaptive largest", self.largest, "s"))
+        check_scheme("Adaptive", self.scheme)
 
     @property
     def newton(self) -> Newton:
@@ -114,9 +122,9 @@ class Adaptive:
         return error <= self.tolerance
 
 
-def _positive(name: str, value: float, unit: str) -> None:
-    if not value > 0:
-        raise InputError(f"{name} has to be positive, got {value!r} {unit}".rstrip())
+def check_scheme(what: str, scheme: object) -> None:
+    """Refuse what is no scheme."""
+    checks.instance(f"{what}: scheme", scheme, Scheme, "BACKWARD_EULER or ESDIRK4")
 
 
 NEWTON_SHARE = 3e-3
@@ -137,7 +145,7 @@ STUCK, CAREFUL = 0.25, 10
 the step, is taken with backward Euler, as are so many after it: where contents vanish or rates jump."""
 
 SMALLEST_STEP = 1e-12
-"""Steps below this fraction of the interval between two kinks count as none."""
+"""Steps below this fraction of the interval between two kinks, or of the time itself, count as none."""
 
 
 @dataclass
@@ -216,6 +224,8 @@ class Stepper:
         at_kink, kink = _following(kinks, time)
         to_kink = kink - time
         stop = min(kink, _following(stops, time)[1])
+        if same_time(stop, kinks[-1]):  # else nothing would be left to step over
+            stop = kinks[-1]
         to_stop = stop - time
         if at_kink or self.wanted is None:
             history.forget()
@@ -252,7 +262,7 @@ class Stepper:
                 scheme, last, self.wanted, self._careful = BACKWARD_EULER, None, tried, CAREFUL
             problem.vector[:] = old
             problem.set_time(time)
-            if self.wanted < SMALLEST_STEP * to_kink:
+            if self.wanted < SMALLEST_STEP * max(to_kink, abs(time)):
                 found = self._singular_mode(time, tried)
                 if found:
                     reason, remedy = f"the linear system is singular: {found}", UNDETERMINED
@@ -372,16 +382,17 @@ def _rms(values: NDArray) -> float:
     return float(np.sqrt(np.mean(values * values)))
 
 
-def _same(a: float, b: float) -> bool:
+def same_time(a: float, b: float) -> bool:
+    """Whether two times [s] differ by round-off only."""
     return abs(a - b) <= 1e-12 * max(1.0, abs(a), abs(b))
 
 
 def _following(times: Sequence[float], time: float) -> tuple[bool, float]:
     """Whether `time` is one of the sorted `times`, and the one that follows it."""
     first = last = bisect_left(times, time)
-    while first > 0 and _same(times[first - 1], time):
+    while first > 0 and same_time(times[first - 1], time):
         first -= 1
-    while last < len(times) and _same(times[last], time):
+    while last < len(times) and same_time(times[last], time):
         last += 1
     return first < last, times[last] if last < len(times) else inf
 

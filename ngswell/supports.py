@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import isfinite
 from typing import TypeAlias
 
-from ngswell.errors import InputError
+from ngswell import checks
 
 
 @dataclass(frozen=True)
@@ -18,12 +17,19 @@ class Roller:
     boundary: str
     direction: str
 
+    def __post_init__(self) -> None:
+        checks.name("Roller: boundary", self.boundary, "left|right")
+        checks.name("Roller: direction", self.direction, "x")
+
 
 @dataclass(frozen=True)
 class Symmetry:
     """A symmetry plane: the displacement normal to a straight boundary along an axis vanishes; no flow through it."""
 
     boundary: str
+
+    def __post_init__(self) -> None:
+        checks.name("Symmetry: boundary", self.boundary, "left")
 
 
 @dataclass(frozen=True)
@@ -32,6 +38,10 @@ class Pin:
 
     point: tuple[float, ...]
     direction: str
+
+    def __post_init__(self) -> None:
+        checks.settle(self, point=checks.vector("Pin: point", self.point, 1e6, "mm"))
+        checks.name("Pin: direction", self.direction, "x")
 
 
 Support: TypeAlias = Roller | Symmetry | Pin
@@ -45,7 +55,8 @@ class Traction:
     vector: tuple[float, ...]
 
     def __post_init__(self) -> None:
-        _finite("Traction", self.vector, 1e3, "N/mm²")
+        checks.name("Traction: boundary", self.boundary, "top")
+        checks.settle(self, vector=checks.vector("Traction", self.vector, 1e3, "N/mm²"))
 
 
 @dataclass(frozen=True)
@@ -59,13 +70,8 @@ class Weight:
     solid: tuple[float, ...]
 
     def __post_init__(self) -> None:
-        _finite("Weight", self.fluid + self.solid, 1.0, "N/mm³")
+        for name in ("fluid", "solid"):
+            checks.settle(self, **{name: checks.vector(f"Weight: {name}", getattr(self, name), 1.0, "N/mm³")})
 
 
 Load: TypeAlias = Traction | Weight
-
-
-def _finite(name: str, values: tuple[float, ...], limit: float, unit: str) -> None:
-    for value in values:
-        if not (isfinite(value) and abs(value) <= limit):
-            raise InputError(f"{name} has a component {value!r} {unit}: it has to be finite and within ±{limit:g}")

@@ -35,8 +35,12 @@ class State(SolidState):
         At the salt concentration c̃ = sqrt(c₊ c₋) of the (ideal) bath in equilibrium with the point, (38) gives
         p + 2 φ Rθ [sqrt(c̃² + cfc(J)²/4) − sqrt(c̃² + cfc²/4)], the last root being c − cfc/2.
         """
-        root = sqrt(self.c * (self.c - self.cfc) + self.pointwise_charge * self.pointwise_charge / 4)
-        return self.p + 2 * self.material.phi * self.material.RT * (root - self.c + self.cfc / 2)
+        return self.p + 2 * self.material.phi * self.material.RT * (sqrt(self.root_squared) - self.c + self.cfc / 2)
+
+    @cached_property
+    def root_squared(self) -> CoefficientFunction:
+        """c̃² + cfc(J)²/4 [mol²/l²]; below zero, where anions undershoot by more than a charge, no pressure follows."""
+        return self.c * (self.c - self.cfc) + self.pointwise_charge * self.pointwise_charge / 4
 
     def transport(self, frame: CoefficientFunction) -> laws.Transport:
         """Fluxes from gradients in the `frame` (a matrix on reference gradients): `pull` or `push`."""
@@ -129,7 +133,7 @@ class Concentration:
         return {"u": length, "p": stress, "c": concentration, "cfc": concentration}
 
     def bounds(self, state: State) -> dict[str, CoefficientFunction]:
-        return {"cation concentration": state.c}
+        return {"cation concentration": state.c, "c̃² + cfc²/4": state.root_squared}
 
     def solution_bounds(self, state: State) -> dict[str, CoefficientFunction]:
         return {"anion concentration c₊ − cfc": (1 + NEGLIGIBLE) * state.c - state.cfc}

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, Literal, Protocol
+from typing import Any, ClassVar, Literal, Protocol, runtime_checkable
 
 from ngsolve import CoefficientFunction, FESpace, Mesh
 
+from ngswell import checks
 from ngswell.baths import Bath, BathFields, Treatment
 from ngswell.errors import InputError
 from ngswell.kinematics import Kinematics
@@ -46,6 +47,7 @@ class Setting:
     bath: BathFields | None
 
 
+@runtime_checkable
 class Model(Protocol):
     """A set of unknowns, the first the displacement: spaces, residual, boundary conditions, outputs."""
 
@@ -110,5 +112,6 @@ def needs_salt(model: str, baths: Sequence[Bath]) -> None:
 
 def check_order(model: str, order: int) -> None:
     """Refuse orders that are not implemented."""
-    if order not in (2, 3, 4, 5, 6):
-        raise InputError(f"{model}(order={order!r}): order 2 to 6 for u, the other unknowns get one less")
+    if not (checks.is_a(order, int) and not isinstance(order, bool) and 2 <= order <= 6):
+        shown = checks.shown(order)
+        raise InputError(f"{model}(order={shown}): order 2 to 6 for u, a whole number; the other unknowns get one less")

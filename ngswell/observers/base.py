@@ -8,9 +8,14 @@ from math import isclose
 import numpy as np
 from numpy.typing import NDArray
 
+from ngswell import checks
 from ngswell.errors import InputError
 from ngswell.problem import Problem
+from ngswell.schedules import LARGEST
 from ngswell.stepping import StepReport
+
+MOST_RECORDS = 10**6
+"""Records that an interval may ask for."""
 
 
 class Observer:
@@ -24,8 +29,13 @@ class Observer:
     """
 
     def __init__(self, when: float | Sequence[float] | None = None, *settings: object) -> None:
-        if isinstance(when, (int, float)) and not when > 0:
-            raise InputError(f"{type(self).__name__}: the interval has to be positive, got {when} s")
+        what = type(self).__name__
+        if checks.is_number(when):
+            when = checks.positive(f"{what}: the interval", when, "s")
+        elif when is not None:
+            when = checks.vector(f"{what}: the times", when, LARGEST, "s")
+            if not when:
+                raise InputError(f"{what}: there are no times to record at; leave `when` out to record every step")
         self.when = when
         self._settings = settings
         self._times: list[float] = []
@@ -40,13 +50,18 @@ class Observer:
         """Times [s] on which steps have to land."""
         if self.when is None:
             self._times = []
-        elif isinstance(self.when, (int, float)):
+        elif isinstance(self.when, float):
+            if (until - begin) / self.when > MOST_RECORDS:
+                raise InputError(
+                    f"{type(self).__name__}: an interval of {self.when:g} s makes more than {MOST_RECORDS} records from "
+                    f"{begin:g} to {until:g} s; take a longer one"
+                )
             self._times = [*np.arange(begin, until, self.when).tolist(), until]
         else:
             for time in self.when:
                 if not begin <= time <= until:
                     raise InputError(f"{type(self).__name__}: {time:g} s is outside the run, {begin:g} to {until:g} s")
-            self._times = [float(time) for time in self.when]
+            self._times = list(self.when)
         return self._times
 
     def _due(self, time: float) -> bool:

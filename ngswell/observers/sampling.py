@@ -8,6 +8,7 @@ import numpy as np
 from ngsolve import CF, BoundaryFromVolumeCF, CoefficientFunction, Integrate, Norm
 from numpy.typing import NDArray
 
+from ngswell import checks
 from ngswell.errors import InputError
 from ngswell.observers.base import Observer
 from ngswell.problem import Problem, Snapshot
@@ -32,7 +33,9 @@ class Probe(Observer):
         super().__init__(when, tuple(point), *quantities)
         if not quantities:
             raise InputError("Probe: name at least one quantity, such as 'displacement'")
-        self.point, self.quantities = tuple(point), quantities
+        for quantity in quantities:
+            checks.name("Probe: a quantity", quantity, "displacement")
+        self.point, self.quantities = checks.vector("Probe: point", point, 1e6, "mm"), quantities
         self._values: dict[str, list] = {name: [] for name in quantities}
 
     def prepare(self, problem: Problem, begin: float, until: float) -> None:
@@ -67,6 +70,9 @@ class Integral(Observer):
         when: float | Sequence[float] | None = None,
     ) -> None:
         super().__init__(when, quantity, boundary)
+        for what, value, example in (("quantity", quantity, "p"), ("boundary", boundary, "top")):
+            if value is not None:
+                checks.name(f"Integral: {what}", value, example)
         self.quantity, self.boundary = quantity, boundary
         self._values: list = []
 

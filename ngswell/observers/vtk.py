@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from glob import escape
 from pathlib import Path
@@ -10,6 +11,7 @@ from xml.sax.saxutils import quoteattr
 from ngsolve import CF, CoefficientFunction, VTKOutput
 from numpy.typing import NDArray
 
+from ngswell import checks
 from ngswell.errors import InputError, OutputError
 from ngswell.files import check_folder, replacing
 from ngswell.observers.base import Observer
@@ -35,6 +37,12 @@ class VTK(Observer):
         overwrite: bool = False,
     ) -> None:
         super().__init__(when, str(path), *quantities)
+        if not isinstance(path, (str, os.PathLike)) or not Path(path).name:
+            raise InputError(f"VTK: path has to name the series, such as 'out/swelling', got {checks.shown(path)}")
+        for quantity in quantities:
+            checks.name("VTK: a quantity", quantity, "displacement")
+        subdivision = checks.whole("VTK: subdivision", subdivision, 0, 5)
+        checks.flag("VTK: overwrite", overwrite)
         self.path, self.quantities, self.subdivision, self.overwrite = Path(path), quantities, subdivision, overwrite
 
     def prepare(self, problem: Problem, begin: float, until: float) -> None:

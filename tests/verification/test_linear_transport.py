@@ -104,7 +104,7 @@ def test_the_series_ends_at_the_linearised_equilibrium():
 def test_what_the_closed_form_cannot_mean_is_refused():
     with pytest.raises(InputError, match="height has to be positive"):
         LinearColumn(TABLE_1, BATH, 0.0)
-    with pytest.raises(InputError, match="bath of 0"):
+    with pytest.raises(InputError, match="bath = 0 mol"):
         LinearColumn(TABLE_1, 0.0, HEIGHT)
     with pytest.raises(InputError, match="mu varies in space"):
         LinearColumn(replace(TABLE_1, mu=CF(0.24)), BATH, HEIGHT)

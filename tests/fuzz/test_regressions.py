@@ -1,0 +1,150 @@
+"""What fuzzed runs have found, each as the smallest run that showed it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ngswell import (
+    TABLE_1,
+    Adaptive,
+    Bath,
+    Concentration,
+    Confined,
+    Fixed,
+    InputError,
+    Ledger,
+    Newton,
+    Penalty,
+    Potential,
+    Ramp,
+    Roller,
+    Scene,
+    Snapshots,
+    StepError,
+    Traction,
+    column,
+    donnan,
+)
+from ngswell.newton import Outcome
+from ngswell.solvers import LinearSolver
+
+
+def scene(**changes) -> Scene:
+    return Scene(
+        **{
+            "mesh": column(0.5, 3),
+            "kinematics": Confined(),
+            "material": TABLE_1,
+            "supports": [Roller("bottom", "x")],
+            "baths": [Bath("top", c=0.15)],
+            **changes,
+        }
+    )
+
+
+class Balks(Newton):
+    """Fails on the first of two attempts at a step, as where the extrapolated start is not admissible."""
+
+    def solve(self, problem, solver):
+        attempts = self.__dict__["attempts"] = self.__dict__.get("attempts", -1) + 1
+        return Outcome(0, "balks", "u", (0.0,)) if attempts % 2 else super().solve(problem, solver)
+
+
+@pytest.mark.parametrize("model", [Potential(), Concentration()])
+def test_a_retried_step_keeps_the_contents_before_a_ramp_of_the_charge(model):
+    # The retry without extrapolation took S(x_old) with the charge at the end of the step: in Potential, whose cations
+    # follow from the charge, a third of them vanished.
+    ledger, newton = Ledger(), Balks()
+    made = scene(model=model, charge=Ramp((0.0, 0.9), (60.0, 1.0)), baths=[Bath("top", c=0.15, treatment=Penalty(1.0))])
+    made.run(60.0, Fixed(10.0), [ledger], newton=newton)
+    assert newton.__dict__["attempts"] == 10  # the first step has nothing to extrapolate, each other is solved twice
+    assert max(ledger.imbalance().values()) < 1e-10  # what quadratic Newton iterations leave
+
+
+def test_a_state_without_pressure_is_not_admissible():
+    # Anions that undershoot far enough leave no root for the momentum balance's pressure: stress was NaN in accepted states.
+    problem = scene(model=Concentration(), baths=[Bath("top", c=0.15, treatment=Penalty(1.0))]).problem
+    problem.initialise()
+    assert problem.inadmissible() is None
+    c, cfc = (problem.fields.components[problem.names.index(name)] for name in ("c", "cfc"))
+    c.vec[:] = 0.05
+    cfc.vec[:] = 0.2  # c (c − cfc) = −0.0075, less is left than cfc²/4 = 0.01 by 0.0025
+    assert problem.inadmissible() is None
+    cfc.vec[:] = 0.3
+    assert not np.isfinite(problem.state.outputs()["stress"](problem.mesh(0.1))).all()
+    assert problem.inadmissible()[0] == "c̃² + cfc²/4"
+
+
+@pytest.mark.parametrize("choice", [Potential(), Concentration()])
+def test_the_last_correction_leaves_the_fields_admissible(choice):
+    # The correction that passes the test of convergence was applied unseen: c̃ of accepted states fell below zero.
+    problem = scene(model=choice, baths=[Bath("top", c=0.15, treatment=Penalty(1.0))]).problem
+    problem.initialise()
+    problem.begin_step(1.0, 1.0)
+    salt = problem.ranges[problem.model.held["cations"]]
+
+    class Overshoots(LinearSolver):
+        """Answers with a long shift of the body, then with a correction within the tolerance that takes all salt away."""
+
+        def renew(self, problem):
+            return True
+
+        def solve(self, right, solution, prescribed=None):
+            self.solves += 1
+            solution[:] = 0.0
+            if self.solves == 1:
+                solution.FV().NumPy()[: problem.mesh.nv] = 10.0
+            else:
+                solution.FV().NumPy()[salt] = problem.vector[salt]
+            return True
+
+    assert Newton(tolerance=1.0, slowest=0.3).solve(problem, Overshoots(problem.free)).reason is None
+    assert problem.inadmissible() is None
+
+
+def test_a_run_may_end_a_rounding_after_a_kink():
+    # 0.1 + 0.2 > 0.3: from the kink nothing but round-off was left, which no step covers: ValueError from min().
+    bath = Bath("top", c=Ramp((0.0, 0.15), (0.3, 0.14)))
+    assert scene(baths=[bath]).run(0.1 + 0.2, Fixed(0.1)).steps[-1].time == 0.1 + 0.2
+
+
+def test_a_record_may_lie_a_rounding_before_the_end():
+    # Likewise from a time that an observer asks for.
+    kept = Snapshots([10 * (1 - 5e-13)])
+    assert scene().run(10.0, Fixed(5.0), [kept]).steps[-1].time == 10.0
+    assert len(kept.states) == 1
+
+
+def test_the_end_has_to_differ_from_the_start_by_more_than_round_off():
+    with pytest.raises(InputError, match="not a time after the start"):  # it was the same ValueError
+        scene(start=1e13).run(1e13 + 1, Fixed(1.0))
+
+
+@pytest.mark.parametrize("steps", [Fixed(1e-9), Adaptive(1e-3, largest=1e-9)])
+def test_steps_lost_in_the_round_off_of_the_time_are_refused(steps):
+    with pytest.raises(InputError, match="lost in the round-off"):  # a step of 0 s: ZeroDivisionError
+        scene(start=1e9).run(1e9 + 1, steps)
+
+
+def test_a_crushed_body_stops_at_late_times_too():
+    # Rejected steps shrank below the round-off of the time: ZeroDivisionError.
+    soft = Scene(
+        mesh=column(0.5, 3),
+        kinematics=Confined(),
+        material=TABLE_1,
+        supports=[Roller("bottom", "x")],
+        baths=[Bath("top", c=0.15)],
+        loads=[Traction("top", (-1000.0,))],
+        start=1e9,
+    )
+    with pytest.raises(StepError) as stopped:
+        soft.run(1e9 + 10, Fixed(1.0))
+    assert stopped.value.time == soft.problem.time == 1e9
+    assert soft.problem.inadmissible() is None
+
+
+def test_pressures_of_a_nearly_uncharged_gel_are_not_negative():
+    # Whatever the round-off of the difference in (38).
+    baths = np.geomspace(1e-12, 10, 40)
+    assert all((donnan.pressure(baths, cfc + 0 * baths, TABLE_1.RT) >= 0).all() for cfc in (0.0, 1e-12, 1e-9))
