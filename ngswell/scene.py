@@ -9,7 +9,7 @@ from functools import cached_property
 from time import perf_counter
 
 import numpy as np
-from ngsolve import CoefficientFunction, FESpace, Mesh, TaskManager, specialcf
+from ngsolve import VOL, CoefficientFunction, FESpace, Mesh, TaskManager, specialcf
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
@@ -146,7 +146,8 @@ class Scene:
                 held.add(name)
             for history in bath.schedules:
                 if isinstance(history, Blend):
-                    history.check_on(points(self.mesh, self.mesh.Boundaries(bath.boundary), 4))
+                    region = VOL if self.mesh.dim == 1 else self.mesh.Boundaries(bath.boundary)  # an end has no points
+                    history.check_on(points(self.mesh, region, 4))
             if not isinstance(self.treatment(bath), self.model.treatments):
                 choices = ", ".join(t.__name__ for t in self.model.treatments)
                 model = type(self.model).__name__

@@ -30,12 +30,12 @@ class Probe(Observer):
     """
 
     def __init__(self, point: Sequence[float], *quantities: str, when: float | Sequence[float] | None = None) -> None:
-        super().__init__(when, tuple(point), *quantities)
         if not quantities:
             raise InputError("Probe: name at least one quantity, such as 'displacement'")
         for quantity in quantities:
             checks.name("Probe: a quantity", quantity, "displacement")
         self.point, self.quantities = checks.vector("Probe: point", point, 1e6, "mm"), quantities
+        super().__init__(when, self.point, *quantities)
         self._values: dict[str, list] = {name: [] for name in quantities}
 
     def prepare(self, problem: Problem, begin: float, until: float) -> None:
