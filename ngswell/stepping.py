@@ -236,6 +236,8 @@ class Stepper:
         scheme = BACKWARD_EULER if self._careful else self.scheme
         while True:
             dt = _landing(self.wanted, to_stop)
+            if same_time(time + dt, stop):  # what would be left is round-off
+                dt = to_stop
             end = stop if dt == to_stop else time + dt
             if scheme.embedded:
                 outcome, error = self._runge_kutta(scheme, time, end, old)

@@ -121,6 +121,12 @@ def test_the_end_has_to_differ_from_the_start_by_more_than_round_off():
         scene(start=1e13).run(1e13 + 1, Fixed(1.0))
 
 
+@pytest.mark.parametrize("steps", [Fixed(3.1e-13), Adaptive(1e-2)])
+def test_a_run_of_picoseconds_ends(steps):
+    # The clock tells 1e-12 s; a step that ended closer to the end than that left nothing to step to: the ValueError again.
+    assert scene().run(5e-12, steps).steps[-1].time == 5e-12
+
+
 @pytest.mark.parametrize("steps", [Fixed(1e-9), Adaptive(1e-3, largest=1e-9)])
 def test_steps_lost_in_the_round_off_of_the_time_are_refused(steps):
     with pytest.raises(InputError, match="lost in the round-off"):  # a step of 0 s: ZeroDivisionError
