@@ -71,7 +71,8 @@ def test_followed_growth_is_recorded_and_said_at_the_end():
 
 
 def test_watching_does_not_change_a_run():
-    # Its forms and factorisations are its own: the same numbers but for the order in which threads add (two runs unwatched: 6e-25).
+    # Its forms and factorisations are its own: the same numbers, but for the order in which threads add (two runs that
+    # nothing watches differ by up to 6e-25).
     scene, rest = potential_at(0.3)
     ends = []
     for watch in ([], [Stability()]):
