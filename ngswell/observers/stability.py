@@ -33,7 +33,7 @@ class Stability(Observer):
     the length of the run unless given, does not count. `rates` [1/s] are those of the fastest perturbation at each `time`, 0
     where none grows; `last` is the latest unstable one, with its mode. What is found, and when it is exact: `Perturbations`.
 
-    A check of a stable state costs as much as two to three Newton iterations, of an unstable one some twenty.
+    A check of a stable state costs as much as two Newton iterations, of an unstable one some ten to thirteen.
     Raises InputError for `Lagged` baths, whose own instability is one of steps (`growth_factor`).
     """
 
