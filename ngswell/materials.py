@@ -221,7 +221,8 @@ def _checked(name: str, value: object) -> float:
         raise InputError(f"{name} has to be a number or a CoefficientFunction, got {checks.shown(value)}")
     number = checks.as_float(value)
     if not (low <= number <= high or (zero and number == 0.0)):
-        raise InputError(f"{name} = {number:.15g} {unit} is outside {low:g} … {high:g}{' or 0' if zero else ''}: {hint}")
+        value = repr(number).removesuffix(".0")
+        raise InputError(f"{name} = {value} {unit} is outside {low:g} … {high:g}{' or 0' if zero else ''}: {hint}")
     return number
 
 
