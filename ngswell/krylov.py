@@ -42,6 +42,8 @@ class TwoLevelSolver(LinearSolver):
     GMRES measures each field in units of its reference (`Problem.references`).
     """
 
+    direct = False
+
     def __init__(self, problem: Problem) -> None:
         super().__init__(problem.free)
         self.iterations = 0  # of the last solve

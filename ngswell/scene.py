@@ -32,7 +32,7 @@ from ngswell.restart import Restart, parts, text_of, versions
 from ngswell.schedules import LARGEST, Blend, Ramp
 from ngswell.schemes import BACKWARD_EULER
 from ngswell.solvers import LinearSolver, solver_of
-from ngswell.stepping import SMALLEST_STEP, Adaptive, Control, Stepper, StepReport, same_time
+from ngswell.stepping import SMALLEST_STEP, Adaptive, Control, Stepper, StepReport, same_time, why
 from ngswell.supports import Load, Pin, Roller, Support, Symmetry, Traction, Weight
 
 
@@ -55,6 +55,12 @@ class Result:
     def rejections(self) -> int:
         """Rejected steps."""
         return sum(len(step.rejected) for step in self.steps)
+
+    def summary(self) -> str:
+        """What the run took, and why steps were rejected."""
+        done = f"{len(self.steps)} steps, {self.iterations} Newton iterations, {self.seconds:.1f} s"
+        reasons = why(text for step in self.steps for text in step.rejected)
+        return f"t = {self.end.time:.10g} s after {done}" + (f"; rejected: {reasons}" if reasons else "")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -38,6 +38,9 @@ class Point(NamedTuple):
 class LinearSolver:
     """Solves A x = b on the free degrees of freedom, for matrices of one pattern whose values change."""
 
+    direct = True
+    """Whether the problem is of a size that is factorised as a whole."""
+
     def __init__(self, free: BitArray, name: str | None = None) -> None:
         self.name = name or best_solver()
         self._free = free

@@ -137,6 +137,11 @@ class Instability:
     wavelength: float
     mode: GridFunction
 
+    def __str__(self) -> str:
+        grows = f"by a factor e in {1 / self.rate:.3g} s" if self.rate < inf else "at once, without any flow"
+        place = ", ".join(f"{x:.4g}" for x in self.where)
+        return f"perturbations grow {grows}, most near ({place}) mm, in wrinkles of about {self.wavelength:.2g} mm"
+
 
 class Perturbations:
     """Small perturbations v exp(s t) of the present state of `problem`, the state itself held: (A + s M) v = 0.

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from bisect import bisect_left
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from math import inf
 from typing import Protocol, runtime_checkable
@@ -12,12 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ngswell import checks
+from ngswell.baths import Lagged
 from ngswell.diagnosis import UNDETERMINED, singular_mode
-from ngswell.errors import InputError, StepError
+from ngswell.errors import REMEDY, InputError, NgswellError, StepError
 from ngswell.newton import LOST, Newton, Outcome
 from ngswell.problem import Problem
 from ngswell.schemes import BACKWARD_EULER, ESDIRK4, Scheme
 from ngswell.solvers import LinearSolver
+from ngswell.stability import Perturbations
 
 
 @dataclass(frozen=True)
@@ -29,6 +32,13 @@ class StepReport:
     iterations: int
     rejected: tuple[str, ...] = ()
     error: float | None = None
+
+
+def why(rejected: Iterable[str]) -> str:
+    """The reasons of rejected steps, the most frequent first."""
+    reasons = (text.partition(": ")[2] for text in rejected)
+    counts = Counter("error above the tolerance" if reason.startswith("error ") else reason for reason in reasons)
+    return ", ".join(f"{count} × {reason}" for reason, count in counts.most_common())
 
 
 @runtime_checkable
@@ -265,9 +275,7 @@ class Stepper:
             problem.vector[:] = old
             problem.set_time(time)
             if self.wanted < SMALLEST_STEP * max(to_kink, abs(time)):
-                found = self._singular_mode(time, tried)
-                if found:
-                    reason, remedy = f"the linear system is singular: {found}", UNDETERMINED
+                reason, remedy = self._explained(reason, remedy, time, tried, kinks[-1] - kinks[0])
                 raise StepError(time, dt, field, where, reason, remedy)
         self._slope = self._next_slope
         self._careful = max(0, self._careful - 1)
@@ -281,14 +289,24 @@ class Stepper:
         self.wanted = max(self.wanted, proposed) if landed_short else proposed
         return StepReport(end, dt, outcome.iterations, tuple(rejected), error)
 
-    def _singular_mode(self, time: float, dt: float) -> str:
-        """What the matrix of a step of backward Euler from the present state leaves undetermined, in words."""
-        old = self.problem.vector.copy()
-        self.problem.begin_step(time + dt, dt)
-        found = singular_mode(self.problem)
-        self.problem.vector[:] = old
-        self.problem.set_time(time)
-        return found
+    def _explained(self, reason: str, remedy: str, time: float, dt: float, duration: float) -> tuple[str, str]:
+        """Reason and remedy of a failure, with what the state itself says: singular, or unstable within the `duration`."""
+        problem = self.problem
+        lagged = any(isinstance(problem.scene.treatment(bath), Lagged) for bath in problem.scene.baths)
+        if lagged or not self.solver.direct:
+            return reason, remedy  # such a state has its own map, or is too large for a factorisation
+        old = problem.vector.copy()
+        problem.begin_step(time + dt, dt)
+        found = singular_mode(problem)
+        problem.vector[:] = old
+        problem.set_time(time)
+        if found:
+            return f"the linear system is singular: {found}", UNDETERMINED
+        try:
+            unstable = Perturbations(problem).fastest(1 / duration)
+        except NgswellError:
+            return reason, remedy
+        return (f"{reason}; the state is unstable: {unstable}", REMEDY) if unstable else (reason, remedy)
 
     def _solve(self, dt: float) -> Outcome:
         """The nonlinear system of a stage whose step of backward Euler is `dt`."""

@@ -78,21 +78,12 @@ class Stability(Observer):
         lost = stage > 0 and found.rate * stage > FOLLOWED
         if lost or not self.follow:
             self._stopped = True
-            reason = _words(found, time)
+            reason = f"the state at t = {time:.10g} s is unstable: {found}."
             if lost:
                 reason += f" Stages of {stage:.3g} s do not follow that."
             raise InstabilityError(time, stage, found.where, found.rate, found.wavelength, reason)
 
     def finish(self, problem: Problem) -> None:
         if self._rates and self._rates[-1] > 0 and not self._stopped and self.last:
-            words = _words(self.last, self._recorded[-1])
-            warnings.warn(f"Stability: the last state looked at is unstable: {words} {REMEDY}", stacklevel=2)
-
-
-def _words(found: Instability, time: float) -> str:
-    grows = f"by a factor e in {1 / found.rate:.3g} s" if found.rate < inf else "at once, without any flow"
-    place = ", ".join(f"{x:.4g}" for x in found.where)
-    return (
-        f"the state at t = {time:.10g} s is unstable: perturbations grow {grows}, most near ({place}) mm, "
-        f"in wrinkles of about {found.wavelength:.2g} mm."
-    )
+            at = f"t = {self._recorded[-1]:.10g} s"
+            warnings.warn(f"Stability: the last state looked at, {at}, is unstable: {self.last}. {REMEDY}", stacklevel=2)
