@@ -18,6 +18,7 @@ STUDIES = (
     "convergence",
     "cylinder",
     "growth",
+    "hard_cases",
     "iteration",
     "reductions",
     "speed_error",
