@@ -11,7 +11,7 @@ from ngswell import checks
 from ngswell.baths import Frozen, Lagged
 from ngswell.diagnosis import UNDETERMINED, singular_mode
 from ngswell.errors import InputError, StepError
-from ngswell.newton import Newton, Outcome
+from ngswell.newton import LOST, Newton, Outcome
 from ngswell.problem import Problem, Snapshot
 from ngswell.schedules import LARGEST
 from ngswell.solvers import LinearSolver, solver_of
@@ -41,7 +41,8 @@ def equilibrate(
     fast as Newton's method follows. Where that ends early, as under a load that only the charged body can bear, the body
     relaxes from its initial state instead, in steps of backward Euler that grow as fast as Newton's method follows. Works
     for fields of position and constrained bodies. Raises InputError for a sealed body (what it holds is not determined by
-    balances) and for treatments that remember the past, and StepError when neither way reaches the state of rest.
+    balances) and for treatments that remember the past, and StepError when neither way reaches the state of rest; the fields
+    then hold the scene's initial state.
     """
     time = scene.start if time is None else checks.number("equilibrate: time", time, "s", -LARGEST, LARGEST)
     if not scene.baths:
@@ -53,6 +54,7 @@ def equilibrate(
     solver = make_solver(problem)
     failure = _raise_charge(problem, time, method, solver)
     if failure and _relax(problem, time, method, solver):
+        problem.initialise()
         raise failure
     problem.set_time(time)
     return problem.snapshot(time)
@@ -68,7 +70,7 @@ def _raise_charge(problem: Problem, time: float, newton: Newton, solver: LinearS
 
     outcome = solve(0.0, problem.vector.copy())
     if outcome.reason is not None:
-        return _give_up(problem, time, 0.0, outcome)
+        return _give_up(problem, 0.0, outcome)
     step, reached = 1.0, [(0.0, problem.vector.copy())]
     while reached[-1][0] < 1.0:
         share, state = reached[-1]
@@ -85,7 +87,7 @@ def _raise_charge(problem: Problem, time: float, newton: Newton, solver: LinearS
         problem.vector[:] = state
         step /= 4
         if step < SMALLEST_SHARE:
-            return _give_up(problem, time, share, outcome)
+            return _give_up(problem, share, outcome)
     return None
 
 
@@ -107,8 +109,10 @@ def _relax(problem: Problem, time: float, newton: Newton, solver: LinearSolver) 
     return True
 
 
-def _give_up(problem: Problem, time: float, share: float, outcome: Outcome) -> StepError:
-    found, reason, remedy = singular_mode(problem), outcome.reason, outcome.remedy
+def _give_up(problem: Problem, share: float, outcome: Outcome) -> StepError:
+    reason, remedy = outcome.reason, outcome.remedy
+    found = singular_mode(problem) if remedy == LOST else ""
     if found:
         reason, remedy = f"the linear system is singular: {found}", UNDETERMINED
-    return StepError(time, STATIONARY, outcome.field, outcome.where, f"at {share:.3g} of the charge, {reason}", remedy)
+    reason = f"equilibrate, at {share:.3g} of the charge: {reason}"
+    return StepError(problem.scene.start, STATIONARY, outcome.field, outcome.where, reason, remedy)

@@ -29,8 +29,8 @@ class Outcome:
 
 SQUEEZED = "Remedies: a smaller or slower load or change of the bath, a finer mesh there."
 UNRESOLVED = (
-    "Remedies: Potential(), whose ions cannot be negative; Penalty or Multiplier in place of Nitsche; "
-    "finer cells at the bath."
+    "Remedies: Penalty or Multiplier in place of Nitsche; where anions are few, a slower change of bath or charge, finer "
+    "cells at the bath; Potential(), whose ions cannot be negative."
 )
 LOST = (
     "Remedies: a gentler ramp, a finer mesh where the field is worst, a weaker penalty; the surface of a gel that is held "

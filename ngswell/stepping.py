@@ -297,7 +297,7 @@ class Stepper:
             return reason, remedy  # such a state has its own map, or is too large for a factorisation
         old = problem.vector.copy()
         problem.begin_step(time + dt, dt)
-        found = singular_mode(problem)
+        found = singular_mode(problem) if remedy == LOST else ""
         problem.vector[:] = old
         problem.set_time(time)
         if found:

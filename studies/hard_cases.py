@@ -8,13 +8,13 @@ fields that are not finite and admissible. Numbers:
 
 - `FAMILY_passes`, `FAMILY_stops` (StepError), `FAMILY_refused` (InputError), `FAMILY_wrong`: attempts; `wrong`: of all;
 - `FAMILY_error_over_bound`, `FAMILY_imbalance`: the largest of those that pass;
-- `alternation_lowest`, `alternation_above_limit`: lowest share of the jump [-] after one step, of all steps and of those with
-  6 κ Δt > h²; `alternation_difference` to the closed form;
+- `alternation_lowest`, `alternation_above_limit`: lowest share of the jump [-] after one step, of all steps and of those
+  with 6 κ Δt > h²; `alternation_difference` to the closed form;
 - `skin_even`, `skin_graded`: error of a tight skin at the bath on 40 cells, relative;
 - `corner_VARIANT_area`, `corner_VARIANT_arch`: errors of the area ratio [-] and of the arch [mm] on the finest mesh, and
   their `..._order` over the last refinement;
-- `wrinkle_um`: amplitude of the seeded wrinkle on the finest mesh [µm], `wrinkle_change` from the next coarser one, relative;
-  `wrinkle_hidden_um` with steps of 100 s, `wrinkle_unseeded_um` without a seed.
+- `wrinkle_um`: amplitude of the seeded wrinkle on the finest mesh [µm], `wrinkle_change` from the next coarser one,
+  relative; `wrinkle_hidden_um` with steps of 100 s, `wrinkle_unseeded_um` without a seed.
 """
 
 from __future__ import annotations
@@ -145,7 +145,9 @@ def draw(attempts: dict[str, list[Attempt]], found: dict[str, Any]) -> Figure:
     draw_corner(axes[1, 1], found["corner_errors"])
     draw_wrinkles(axes[1, 2], found["wrinkle_series"])
     for ax, letter in zip(axes.flat, "abcdef", strict=True):
-        ax.set_title(f"({letter}) {ax.get_title()}", loc="left")
+        title = ax.get_title()
+        ax.set_title("")
+        ax.set_title(f"({letter}) {title}", loc="left")
     return figure
 
 
@@ -160,7 +162,8 @@ def draw_outcomes(ax: Axes, attempts: dict[str, list[Attempt]]) -> None:
         left += counts
     ax.set(title="how attempts end", xlabel="attempts")
     ax.set_yticks(range(len(names)), [name.replace("_", " ") for name in names])
-    ax.legend(loc="lower right")
+    ax.set_xlim(0, 1.05 * left.max())
+    ax.legend(loc="best")
     ax.grid(axis="y", visible=False)
 
 
@@ -188,7 +191,7 @@ def draw_skin(ax: Axes, series: dict[str, Any]) -> None:
     ax.set(title="skin of 1e-4 of K and D at the bath", xlabel="cells", ylabel="relative error of the top")
     ax.set_xticks(series["cells"], [str(n) for n in series["cells"]])
     ax.minorticks_off()
-    ax.legend(loc="center left")
+    ax.legend(loc="lower left")
 
 
 def draw_corner(ax: Axes, rows: Sequence[tuple[Any, ...]]) -> None:
@@ -208,7 +211,7 @@ def draw_corner(ax: Axes, rows: Sequence[tuple[Any, ...]]) -> None:
     ticks = sorted({r[1] for r in rows})
     ax.set_xticks(ticks, [str(n) for n in ticks])
     ax.minorticks_off()
-    ax.legend(fontsize=6.5, loc="lower left")
+    ax.legend(fontsize=6.5, loc="lower left", handlelength=4)
 
 
 def draw_wrinkles(ax: Axes, courses: Sequence[Course]) -> None:

@@ -98,7 +98,7 @@ def test_refusals():
         strip(Lagged()).equilibrate()
     # Without charge and λ nothing but µ (1 − nS0²)/nS0 = 0.9 N/mm² resists up to the compression point.
     soft = replace(TABLE_1, cfc0=0.0, lam=0.0)
-    with pytest.raises(StepError, match="at 0 of the charge, fluid content J − nS0 would not stay positive"):
+    with pytest.raises(StepError, match="at 0 of the charge: fluid content J − nS0 would not stay positive"):
         strip(material=soft, loads=[Traction("top", (0.0, -0.91))]).equilibrate()
 
 
