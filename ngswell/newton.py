@@ -153,7 +153,7 @@ class Newton:
             renew = not known
             correction.data = simplified
         if beyond:
-            return Outcome(count, f"{beyond[0]} would not stay positive", beyond[0], beyond[1])
+            return Outcome(count, f"{beyond[0]} would not stay positive", beyond[0], beyond[1], SQUEEZED)
         return failure(self.most_iterations, f"Newton's method needs more than {self.most_iterations} iterations")
 
     def _may_keep(self, solver: LinearSolver) -> bool:
