@@ -221,7 +221,7 @@ def _checked(name: str, value: object) -> float:
         raise InputError(f"{name} has to be a number or a CoefficientFunction, got {checks.shown(value)}")
     number = checks.as_float(value)
     if not (low <= number <= high or (zero and number == 0.0)):
-        raise InputError(f"{name} = {number!r} {unit} is outside {low:g} … {high:g}{' or 0' if zero else ''}: {hint}")
+        raise InputError(f"{name} = {number:.6g} {unit} is outside {low:g} … {high:g}{' or 0' if zero else ''}: {hint}")
     return number
 
 

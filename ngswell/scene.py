@@ -28,7 +28,7 @@ from ngswell.quadrature import points, vertices, vertices_of
 from ngswell.schedules import LARGEST, Blend, Ramp
 from ngswell.schemes import BACKWARD_EULER
 from ngswell.solvers import LinearSolver, solver_of
-from ngswell.stepping import SMALLEST_STEP, Adaptive, Control, Stepper, StepReport, same_time
+from ngswell.stepping import Adaptive, Control, Stepper, StepReport, resolution, same_time
 from ngswell.supports import Load, Pin, Roller, Support, Symmetry, Traction, Weight
 
 
@@ -342,7 +342,7 @@ class Scene:
         control = Adaptive() if steps is None else steps
         checks.instance("steps", control, Control, "Adaptive(tolerance) or Fixed(step)")
         first = control.first(until - begin, None)
-        if first < SMALLEST_STEP * max(until - begin, abs(begin), abs(until)):
+        if first < resolution(until - begin, begin, until):
             raise InputError(
                 f"steps: {control} starts with {first:g} s, which is lost in the round-off of a run from {begin:g} to "
                 f"{until:g} s; take longer steps or a larger tolerance"
