@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from ngswell import checks
 from ngswell.errors import InputError
+from ngswell.quadrature import with_corners
 
 Grade = dict[str, float]
 """Boundary name → how many times thinner the cell at that boundary is than the largest of its row [-]."""
@@ -29,18 +30,6 @@ _CELLS = {
     2: {"triangle": ET.TRIG, "quadrilateral": ET.QUAD},
     3: {"tetrahedron": ET.TET, "hexahedron": ET.HEX, "prism": ET.PRISM, "pyramid": ET.PYRAMID},
 }
-
-
-_CORNERS: dict[Any, list[tuple[int, ...]]] = {
-    ET.SEGM: [(0,), (1,)],
-    ET.TRIG: [(0, 0), (1, 0), (0, 1)],
-    ET.QUAD: [(0, 0), (1, 0), (1, 1), (0, 1)],
-    ET.TET: [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)],
-    ET.HEX: [(x, y, z) for z in (0, 1) for y in (0, 1) for x in (0, 1)],
-    ET.PRISM: [(x, y, z) for z in (0, 1) for x, y in ((0, 0), (1, 0), (0, 1))],
-    ET.PYRAMID: [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)],  # at the apex the mapping is singular
-}
-"""Corners of the reference cells."""
 
 
 def column(height: float, cells: int, grade: Grade | None = None) -> Mesh:
@@ -164,9 +153,7 @@ def check_mesh(mesh: Mesh) -> None:
     """
     round_off = 1e-12 * float(np.ptp(mesh.ngmesh.Coordinates(), axis=0).max())
     for name, shape in _CELLS[mesh.dim].items():
-        inside, corners = IntegrationRule(shape, 4), _CORNERS[shape]
-        rule = IntegrationRule([*corners, *inside.points], [0.0] * (len(corners) + len(inside)))
-        where = mesh.MapToAllElements({shape: rule}, VOL)
+        where = mesh.MapToAllElements({shape: with_corners(shape, 4)}, VOL)
         if not len(where):
             continue
         mapping = specialcf.JacobianMatrix(mesh.dim)(where).reshape(-1, mesh.dim, mesh.dim)
@@ -177,7 +164,7 @@ def check_mesh(mesh: Mesh) -> None:
         if len(bad):
             found = thickness[where["nr"] == bad[0]]
             fault = "is turned inside out" if found.min() < -round_off else "has no size"
-            if (found[len(corners) :] > round_off).all():
+            if (found[: len(IntegrationRule(shape, 4))] > round_off).all():
                 fault = "has a corner of 180° or more"
             vertices = [mesh[vertex].point for vertex in mesh[ElementId(VOL, int(bad[0]))].vertices]
             place = ", ".join(f"{x:.4g}" for x in np.mean(vertices, axis=0))

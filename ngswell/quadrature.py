@@ -25,14 +25,16 @@ def points(mesh: Mesh, region: object = VOL, order: int = 4) -> NDArray:
     return mesh.MapToAllElements({shape: IntegrationRule(shape, order) for shape in _SHAPES}, region)
 
 
+def with_corners(shape: ET, order: int) -> IntegrationRule:
+    """The integration rule of degree `order` on a cell, and its corners with no weight."""
+    rule, corners = IntegrationRule(shape, order), _CORNERS[shape]
+    inside = [point if isinstance(point, tuple) else (point,) for point in rule.points]
+    return IntegrationRule([*inside, *corners], [*rule.weights, *(0.0 for _ in corners)])
+
+
 def points_and_corners(mesh: Mesh, order: int) -> NDArray:
-    """The same on the cells of the body, with their corners."""
-    rules = {}
-    for shape, corners in _CORNERS.items():
-        rule = IntegrationRule(shape, order)
-        places = [point if isinstance(point, tuple) else (point,) for point in rule.points]
-        rules[shape] = IntegrationRule([*places, *corners], [*rule.weights, *(0.0 for _ in corners)])
-    return mesh.MapToAllElements(rules, VOL)
+    """Mapped integration points of degree `order` on the cells of the body, and the cells' corners."""
+    return mesh.MapToAllElements({shape: with_corners(shape, order) for shape in _CORNERS}, VOL)
 
 
 def integral_on_boundary(

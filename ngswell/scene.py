@@ -32,7 +32,7 @@ from ngswell.restart import Restart, parts, text_of, versions
 from ngswell.schedules import LARGEST, Blend, Ramp
 from ngswell.schemes import BACKWARD_EULER
 from ngswell.solvers import LinearSolver, solver_of
-from ngswell.stepping import SMALLEST_STEP, Adaptive, Control, Stepper, StepReport, same_time, why
+from ngswell.stepping import Adaptive, Control, Stepper, StepReport, resolution, same_time, why
 from ngswell.supports import Load, Pin, Roller, Support, Symmetry, Traction, Weight
 
 
@@ -391,7 +391,7 @@ class Scene:
         control = Adaptive() if steps is None else steps
         checks.instance("steps", control, Control, "Adaptive(tolerance) or Fixed(step)")
         first = control.first(until - begin, None)
-        if first < SMALLEST_STEP * max(until - begin, abs(begin), abs(until)):
+        if first < resolution(until - begin, begin, until):
             raise InputError(
                 f"steps: {control} starts with {first:g} s, which is lost in the round-off of a run from {begin:g} to "
                 f"{until:g} s; take longer steps or a larger tolerance"

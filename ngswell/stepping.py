@@ -155,7 +155,7 @@ STUCK, CAREFUL = 0.25, 10
 the step, is taken with backward Euler, as are so many after it: where contents vanish or rates jump."""
 
 SMALLEST_STEP = 1e-12
-"""Steps below this fraction of the interval between two kinks, or of the time itself, count as none."""
+"""Steps below this fraction of the interval between two kinks, of the time itself or of 1 s count as none."""
 
 
 @dataclass
@@ -274,7 +274,7 @@ class Stepper:
                 scheme, last, self.wanted, self._careful = BACKWARD_EULER, None, tried, CAREFUL
             problem.vector[:] = old
             problem.set_time(time)
-            if self.wanted < SMALLEST_STEP * max(to_kink, abs(time)):
+            if self.wanted < resolution(to_kink, time):
                 reason, remedy = self._explained(reason, remedy, time, tried, kinks[-1] - kinks[0])
                 raise StepError(time, dt, field, where, reason, remedy)
         self._slope = self._next_slope
@@ -402,9 +402,14 @@ def _rms(values: NDArray) -> float:
     return float(np.sqrt(np.mean(values * values)))
 
 
+def resolution(*times: float) -> float:
+    """What the clock tells apart at these times [s]."""
+    return SMALLEST_STEP * max(1.0, *map(abs, times))
+
+
 def same_time(a: float, b: float) -> bool:
     """Whether two times [s] differ by round-off only."""
-    return abs(a - b) <= 1e-12 * max(1.0, abs(a), abs(b))
+    return abs(a - b) <= resolution(a, b)
 
 
 def _following(times: Sequence[float], time: float) -> tuple[bool, float]:
