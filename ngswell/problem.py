@@ -347,6 +347,8 @@ class Problem:
 
     @cached_property
     def _solution_bounds(self) -> dict[str, tuple[Any, NDArray]]:
+        if any(isinstance(entry.treatment, Lagged) for entry in self._baths):
+            return {}  # there to be watched as it goes wrong: its oscillation drives anions below zero
         return self._at_own_points(self.model.solution_bounds(self.state))
 
     def _at_own_points(self, bounds: dict[str, Any]) -> dict[str, tuple[Any, NDArray]]:

@@ -262,7 +262,7 @@ def check_stop(scene: Scene, stopped: StepError, watch: Watch) -> None:
     assert stopped.reason
     assert len(stopped.where) == scene.mesh.dim
     assert np.isfinite(stopped.where).all()
-    assert stopped.field in (*scene.problem.names, *scene.problem._bounds)
+    assert stopped.field in (*scene.problem.names, *scene.problem._bounds, *scene.problem._solution_bounds)
     assert "nan" not in str(stopped)
 
 
