@@ -161,7 +161,7 @@ _PARTS = ("kinematics", "material", "model", "supports", "loads", "charge", "sta
 def text_of(value: Any, where: NDArray | None = None) -> str:
     """A description that is the same in every process; of a function its name only."""
     if isinstance(value, CoefficientFunction):
-        return _numbers(value(where))
+        return type(value).__name__ if where is None else _numbers(value(where))
     if isinstance(value, (bool, str, type(None))):
         return repr(value)
     if isinstance(value, (int, float, np.integer, np.floating)):

@@ -440,7 +440,11 @@ class Scene:
                 linear = solver(problem)
                 checks.instance("what solver makes", linear, LinearSolver, "a LinearSolver, as TwoLevelSolver")
                 stepper = Stepper(problem, control, newton or control.newton, linear)
-                method = text_of((control, stepper.newton, type(stepper.solver).__name__, stepper.solver.name))
+                method = (
+                    ""
+                    if restart is None and not checkpoints
+                    else text_of((control, stepper.newton, type(stepper.solver).__name__, stepper.solver.name))
+                )
                 if restart is not None:
                     stepper.remember(restart.stepper, same=restart.method == method)
                 memory = stepper.memory()

@@ -303,19 +303,18 @@ DISTURBANCE = 1e-8  # mm
 
 
 def disturbed(name: str, step: float) -> tuple[NDArray, NDArray, Scene]:
-    """Times [s], sideways displacement [mm] of a point of the surface, after a random disturbance of rest; 60 steps."""
+    """Times [s], sideways displacement [mm] of a point of the surface, after a random disturbance of rest.
+
+    60 steps, fewer where a cell folds before.
+    """
     scene = held_sideways(name, 4, RUN_AWAY)
     problem = scene.problem
     state = swell(problem, homogeneous_equilibrium(TABLE_2, RUN_AWAY, "confined").J, RUN_AWAY)
     probe = Probe((2 * CELL, 4 * CELL), "displacement")
     # The disturbance is far below Newton's usual tolerance.
-    scene.run(
-        60 * step,
-        Fixed(step),
-        [probe],
-        newton=Newton(tolerance=1e-13),
-        resume=with_noise(problem, Snapshot(0.0, state), DISTURBANCE),
-    )
+    start = with_noise(problem, Snapshot(0.0, state), DISTURBANCE)
+    with suppress(StepError):
+        scene.run(60 * step, Fixed(step), [probe], newton=Newton(tolerance=1e-13), resume=start)
     return probe.time, np.abs(probe.values["displacement"][:, 0]), scene
 
 
