@@ -275,6 +275,10 @@ def test_both_forms_of_the_fluxes_agree_and_rest_in_equilibrium(material, nF, ba
     D = max(values(*(CF(d) for d in laws.diffusivities(CF(nF), m))))
     K = float(values(CF(laws.permeability(CF(m.nS0 / (1 - nF)), m)))[0])
 
+    # Θ is a sum, the currents that it divides are not: D₋ = 1000 D₊ loses three digits of c − cfc and of grad c − grad cfc.
+    conductance = m.D_plus * c_plus + m.D_minus * c_minus + cfc**2 * K * m.RT / nF
+    condition = 1 + max(m.D_plus, m.D_minus) * c_plus / conductance
+
     def disagreement(grad_P, grad_bath, grad_cfc) -> float:
         """Largest difference of the fluxes, in round-offs of what each is a sum of."""
         grad_root = 2 * (m.Gamma**2 * bath * grad_bath + cfc * grad_cfc / 4) / (c_plus + c_minus)
@@ -287,10 +291,10 @@ def test_both_forms_of_the_fluxes_agree_and_rest_in_equilibrium(material, nF, ba
         force = np.abs(grad_P).max() + 2 * m.RT * (np.abs([grad_c, grad_cfc]).max() + m.phi_bath * np.abs(grad_bath).max())
         salt = c_plus * K * force + nF * D * force / m.RT
         pairs = zip(by_ions, by_potentials, (K * force, salt, salt), strict=True)
-        return max(float(np.abs(a - b).max()) / (EPS * size) if size else 0.0 for a, b, size in pairs)
+        return max(float(np.abs(a - b).max()) / (EPS * size * condition) if size > 1e-250 else 0.0 for a, b, size in pairs)
 
     grad_cfc = np.array(of_cfc) * max(cfc, 1e-3)
-    # Measured: 23 in thousands of states.
+    # Measured: 17 in 10 000 states.
     assert disagreement(np.array(of_P), bath * np.array(of_salt), grad_cfc) <= 64
     # Uniform P and c̃: the potentials' fluxes vanish identically, those of (p, c, cfc) to round-off.
     assert disagreement(np.zeros(2), np.zeros(2), grad_cfc) <= 64
