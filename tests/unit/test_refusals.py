@@ -238,7 +238,7 @@ def test_symmetry_needs_a_straight_boundary():
         # What fuzzing found: other exceptions than these, or nothing, until then.
         (lambda: Material(**{**GOOD, "mu": 10**400}), "mu = inf"),
         (lambda: Material(**{**GOOD, "mu": CF(1j)}), "mu has to be scalar and real"),
-        (lambda: Material(**{**GOOD, "nS0": 5e-324}), "nS0 = 4.94066e-324"),
+        (lambda: Material(**{**GOOD, "nS0": 5e-324}), "nS0 = 5e-324"),
         (lambda: Material(**GOOD, permeability=lambda K, J, nS0: K * math.nan), "permeability .* gives K = nan"),
         (lambda: Material(**GOOD, diffusivity=lambda D, nF: -D), "diffusivity .* gives D = -1"),
         (
