@@ -59,7 +59,7 @@ def test_followed_growth_is_recorded_and_said_at_the_end():
     # 0.5648 1/s at rest in 0.1 mol/l: steps of 0.5 s follow it (s Δt = 0.28), of 1 s do not (0.56).
     scene, rest = potential_at(0.1)
     watch = Stability(follow=True)
-    with pytest.warns(UserWarning, match="last state looked at is unstable"):
+    with pytest.warns(UserWarning, match="last state looked at, t = 2 s, is unstable"):
         scene.run(2.0, Fixed(0.5), [watch], resume=rest)
     assert watch.rates == pytest.approx(np.full(5, 0.5648), rel=1e-3)
     with pytest.raises(InstabilityError, match="do not follow"):
