@@ -207,7 +207,12 @@ def draw_corner(ax: Axes, rows: Sequence[tuple[Any, ...]]) -> None:
             ax.loglog(
                 cells, [r[column] for r in mine], line, color=shade, marker=marker, mfc="w", ms=4, label=f"{name}: {of}"
             )
-    ax.set(title="baths that jump at a corner", xlabel="cells a side", ylabel="error of area ratio; of arch [mm]", ylim=(1e-3, 2e-1))
+    ax.set(
+        title="baths that jump at a corner",
+        xlabel="cells a side",
+        ylabel="error of area ratio; of arch [mm]",
+        ylim=(1e-3, 2e-1),
+    )
     ticks = sorted({r[1] for r in rows})
     ax.set_xticks(ticks, [str(n) for n in ticks])
     ax.minorticks_off()
