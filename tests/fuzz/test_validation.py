@@ -208,7 +208,8 @@ def wrong(good) -> st.SearchStrategy:
     inside = st.tuples(st.integers(0, len(good) - 1), JUNK).map(
         lambda pair: (*good[: pair[0]], pair[1], *good[pair[0] + 1 :])
     )
-    return st.one_of(JUNK, inside, st.just(list(good)), st.just(np.array(good)), st.just(good + good))
+    as_array = np.array(good, dtype=None if all(isinstance(entry, (int, float)) for entry in good) else object)
+    return st.one_of(JUNK, inside, st.just(list(good)), st.just(as_array), st.just(good + good))
 
 
 @fuzzed(500, piece=pieces(0))
