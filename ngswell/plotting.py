@@ -13,7 +13,7 @@ from ngsolve import CF, ET, VOL, CoefficientFunction, IntegrationRule, x, y
 from numpy.typing import NDArray
 
 from ngswell.errors import InputError
-from ngswell.problem import Problem
+from ngswell.problem.problem import Problem
 
 STYLE: dict[str, Any] = {
     "font.family": "serif",

@@ -14,26 +14,27 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from ngswell import checks
-from ngswell.baths import Bath, Lagged, Multiplier, Treatment, Weak
+from ngswell.analysis.diagnosis import cannot_change_volume, connected_parts, free_motion
+from ngswell.baths.bath import Bath, Lagged, Multiplier, Treatment, Weak
 from ngswell.checks import shown
-from ngswell.diagnosis import cannot_change_volume, connected_parts, free_motion
-from ngswell.equilibrium import equilibrate
 from ngswell.errors import InputError
-from ngswell.kinematics import Kinematics
-from ngswell.materials import Material
-from ngswell.meshes import check_mesh
-from ngswell.models import Model, Potential
-from ngswell.newton import Newton
+from ngswell.mesh.points import points, vertices, vertices_of
+from ngswell.mesh.shapes import check_mesh
+from ngswell.models.model import Model
+from ngswell.models.potential import Potential
 from ngswell.observers.base import Observer
-from ngswell.observers.checkpoint import Checkpoint, Signals, Stopped
-from ngswell.problem import Problem, Snapshot
-from ngswell.quadrature import points, vertices, vertices_of
-from ngswell.restart import Restart, parts, text_of, versions
+from ngswell.physics.kinematics import Kinematics
+from ngswell.physics.material import Material
+from ngswell.problem.problem import Problem, Snapshot
+from ngswell.run.checkpoint import Checkpoint, Signals, Stopped
+from ngswell.run.equilibrium import equilibrate
+from ngswell.run.restart import Restart, parts, text_of, versions
 from ngswell.schedules import LARGEST, Blend, Ramp
-from ngswell.schemes import BACKWARD_EULER
-from ngswell.solvers import LinearSolver, solver_of
-from ngswell.stepping import Adaptive, Control, Stepper, StepReport, resolution, same_time, why
-from ngswell.supports import Load, Pin, Roller, Support, Symmetry, Traction, Weight
+from ngswell.setup.supports import Load, Pin, Roller, Support, Symmetry, Traction, Weight
+from ngswell.solve.direct import LinearSolver, solver_of
+from ngswell.solve.newton import Newton
+from ngswell.stepping.schemes import BACKWARD_EULER
+from ngswell.stepping.stepper import Adaptive, Control, Stepper, StepReport, resolution, same_time, why
 
 
 @dataclass(frozen=True)

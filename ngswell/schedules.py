@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ngswell import checks
 from ngswell.errors import InputError
-from ngswell.materials import Field, check_scalar
+from ngswell.physics.material import Field, check_scalar
 
 LARGEST = 1e15
 """Times and values beyond this are none that a history can mean."""

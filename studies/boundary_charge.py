@@ -28,10 +28,10 @@ from ngswell import (
     Scene,
     Traction,
     column,
-    donnan,
 )
-from ngswell.analytic import homogeneous_equilibrium
-from ngswell.baths import Treatment
+from ngswell.baths.bath import Treatment
+from ngswell.closed_forms.homogeneous import homogeneous_equilibrium
+from ngswell.physics import donnan
 from studies.output import Findings, cost
 
 HEIGHT = 0.5  # mm

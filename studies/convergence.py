@@ -68,18 +68,17 @@ from ngswell import (
     Roller,
     Scene,
     StepError,
-    donnan,
-    laws,
     rectangle,
 )
-from ngswell.analytic import homogeneous_equilibrium
-from ngswell.baths import BathFields
+from ngswell.baths.bath import BathFields
+from ngswell.closed_forms.homogeneous import homogeneous_equilibrium
 from ngswell.models.concentration import State
-from ngswell.models.terms import Setting, Term
-from ngswell.newton import Newton, Outcome
+from ngswell.models.model import Setting, Term
+from ngswell.physics import donnan, laws
 from ngswell.plotting import on_deformed_body
-from ngswell.problem import Problem, Snapshot
-from ngswell.solvers import LinearSolver
+from ngswell.problem.problem import Problem, Snapshot
+from ngswell.solve.direct import LinearSolver
+from ngswell.solve.newton import Newton, Outcome
 from studies import free_swelling
 from studies.output import Findings
 

@@ -49,7 +49,7 @@ from ngswell import (
     box,
     rectangle,
 )
-from ngswell.analytic import homogeneous_equilibrium
+from ngswell.closed_forms.homogeneous import homogeneous_equilibrium
 from ngswell.plotting import on_deformed_body
 from studies.free_swelling import BOTTOM, END, INITIAL, SIDE
 from studies.output import Findings, cost

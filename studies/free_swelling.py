@@ -51,9 +51,9 @@ from ngswell import (
     Symmetry,
     rectangle,
 )
-from ngswell.analytic import homogeneous_equilibrium
-from ngswell.baths import Treatment
-from ngswell.models import Model
+from ngswell.baths.bath import Treatment
+from ngswell.closed_forms.homogeneous import homogeneous_equilibrium
+from ngswell.models.model import Model
 from ngswell.plotting import on_deformed_body
 from studies.output import Findings, cost
 

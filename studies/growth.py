@@ -44,10 +44,10 @@ from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
 from ngswell import TABLE_2, Potential, Ramp, Scene
-from ngswell.analytic import homogeneous_equilibrium
-from ngswell.krylov import TwoLevelSolver, gmres, units
-from ngswell.problem import Problem
-from ngswell.solvers import LinearSolver, best_solver
+from ngswell.closed_forms.homogeneous import homogeneous_equilibrium
+from ngswell.problem.problem import Problem
+from ngswell.solve.direct import LinearSolver, best_solver
+from ngswell.solve.two_level import TwoLevelSolver, gmres, units
 from studies import cylinder, free_swelling
 from studies.free_swelling import INITIAL, SIDE, WIDTH
 from studies.output import Findings

@@ -22,12 +22,12 @@ from ngswell import (
     Scene,
     StepError,
 )
-from ngswell.baths import Treatment
-from ngswell.models import Model
-from ngswell.newton import Newton
-from ngswell.observers import Observer
-from ngswell.problem import Snapshot
-from ngswell.stepping import Control
+from ngswell.baths.bath import Treatment
+from ngswell.models.model import Model
+from ngswell.observers.base import Observer
+from ngswell.problem.problem import Snapshot
+from ngswell.solve.newton import Newton
+from ngswell.stepping.stepper import Control
 
 CHOICES: dict[str, tuple[Model, Treatment]] = {
     "Potential": (Potential(), Essential()),

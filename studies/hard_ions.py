@@ -37,18 +37,18 @@ from ngswell import (
     Symmetry,
     Traction,
     column,
-    donnan,
     rectangle,
 )
-from ngswell.analytic import homogeneous_equilibrium
-from ngswell.baths import Treatment
-from ngswell.linear import LinearColumn, conductance, diffusivities, penalty_efflux, potentials, storage
-from ngswell.models import Model
-from ngswell.observers import Observer
-from ngswell.problem import Problem, Snapshot
-from ngswell.quadrature import vertices
-from ngswell.schemes import BACKWARD_EULER, ESDIRK4, Scheme
-from ngswell.stepping import Control
+from ngswell.baths.bath import Treatment
+from ngswell.closed_forms.homogeneous import homogeneous_equilibrium
+from ngswell.closed_forms.linear_column import LinearColumn, conductance, diffusivities, penalty_efflux, potentials, storage
+from ngswell.mesh.points import vertices
+from ngswell.models.model import Model
+from ngswell.observers.base import Observer
+from ngswell.physics import donnan
+from ngswell.problem.problem import Problem, Snapshot
+from ngswell.stepping.schemes import BACKWARD_EULER, ESDIRK4, Scheme
+from ngswell.stepping.stepper import Control
 from studies.hard import CHOICES, DEFAULTS, Attempt, attempt
 
 HEIGHT, BATH = 0.5, 0.15  # [mm], [mol/l]
@@ -462,9 +462,9 @@ def linear_column(
 ) -> NDArray:
     """Displacement of the top [mm] after 1, 2, … `count` steps of backward Euler, per small change of the bath [mol/l].
 
-    C ∂w/∂t = ∂(L ∂w)/∂x of `ngswell.linear`, on layers (thickness [mm], L) from the sealed bottom up; at the top w is the
-    bath's, or −L ∂w = efflux (w − the bath's). Spectral elements of degree 12, each layer in pieces thinned by four towards
-    its ends down to sqrt(κ Δt): 1e-8 against the closed form of `LinearColumn`.
+    C ∂w/∂t = ∂(L ∂w)/∂x of `closed_forms.linear_column` on layers (thickness [mm], L), from the sealed bottom up; at the
+    top w is the bath's, or −L ∂w = efflux (w − the bath's). Spectral elements of degree 12, each layer in pieces thinned by
+    four towards its ends down to sqrt(κ Δt): 1e-8 against the closed form of `LinearColumn`.
     """
     C, jump = storage(TABLE_1, BATH), potentials(TABLE_1, BATH, salt=1.0)
     pieces = []

@@ -41,15 +41,15 @@ from ngswell import (
     box,
     check_mesh,
     column,
-    donnan,
     from_occ,
     rectangle,
 )
-from ngswell.analytic import FREE_DIRECTIONS, homogeneous_equilibrium
-from ngswell.baths import Treatment
-from ngswell.models import Model
-from ngswell.problem import Snapshot
-from ngswell.quadrature import points
+from ngswell.baths.bath import Treatment
+from ngswell.closed_forms.homogeneous import FREE_DIRECTIONS, homogeneous_equilibrium
+from ngswell.mesh.points import points
+from ngswell.models.model import Model
+from ngswell.physics import donnan
+from ngswell.problem.problem import Snapshot
 from ngswell.schedules import Schedule
 from studies import free_swelling
 from studies.free_swelling import HEIGHT, INITIAL, SIDE, WIDTH

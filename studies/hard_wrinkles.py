@@ -31,10 +31,10 @@ from ngswell import (
     Symmetry,
     rectangle,
 )
-from ngswell.observers import Observer
-from ngswell.problem import Problem
-from ngswell.stability import Perturbations
-from ngswell.stepping import Control
+from ngswell.analysis.stability import Perturbations
+from ngswell.observers.base import Observer
+from ngswell.problem.problem import Problem
+from ngswell.stepping.stepper import Control
 from studies.hard import DEFAULTS, Attempt, attempt
 
 HEIGHT = 0.2  # mm, of the layer with its skin

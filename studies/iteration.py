@@ -22,7 +22,7 @@ from ngsolve import SetNumThreads, TaskManager, ngsglobals
 from threadpoolctl import threadpool_limits
 
 from ngswell import Adaptive, Concentration, Potential, Progress, Result, Scene
-from ngswell.solvers import solver_of
+from ngswell.solve.direct import solver_of
 from studies import free_swelling
 from studies.free_swelling import INITIAL
 from studies.output import Findings, cost

@@ -72,11 +72,11 @@ from ngswell import (
     box,
     rectangle,
 )
-from ngswell.baths import Treatment
+from ngswell.baths.bath import Treatment
 from ngswell.errors import InputError
-from ngswell.models.terms import Term
-from ngswell.problem import Problem
-from ngswell.supports import Support
+from ngswell.models.model import Term
+from ngswell.problem.problem import Problem
+from ngswell.setup.supports import Support
 
 
 class Chosen(NamedTuple):

@@ -32,13 +32,13 @@ from ngswell import (
     Roller,
     Scene,
     Traction,
-    donnan,
     rectangle,
 )
-from ngswell.analytic import lagged_column_factor
-from ngswell.baths import Treatment
-from ngswell.problem import Snapshot
-from ngswell.stability import growth_factor
+from ngswell.analysis.stability import growth_factor
+from ngswell.baths.bath import Treatment
+from ngswell.closed_forms.homogeneous import lagged_column_factor
+from ngswell.physics import donnan
+from ngswell.problem.problem import Snapshot
 from studies.output import Findings, cost
 
 BATH = 0.15  # mol/l

@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 
 from ngswell import OutputError, Result, __version__
 from ngswell.files import check_folder, replacing
-from ngswell.solvers import best_solver
+from ngswell.solve.direct import best_solver
 
 SUFFIXES = (".png", ".csv", ".json")
 

@@ -53,10 +53,10 @@ from ngswell import (
     Traction,
     Uncharged,
     column,
-    donnan,
     rectangle,
 )
-from ngswell.models import Model
+from ngswell.models.model import Model
+from ngswell.physics import donnan
 from studies.output import Findings, cost
 
 HEIGHT = 0.5  # mm

@@ -49,8 +49,8 @@ from ngswell import (
     Snapshots,
     rectangle,
 )
-from ngswell.models import Model
-from ngswell.stepping import polynomial_at
+from ngswell.models.model import Model
+from ngswell.stepping.stepper import polynomial_at
 from studies import free_swelling
 from studies.free_swelling import END, HEIGHT, INITIAL, WIDTH
 from studies.output import Findings, cost

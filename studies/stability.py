@@ -52,13 +52,13 @@ from ngswell import (
     Scene,
     Symmetry,
     Traction,
-    donnan,
     rectangle,
 )
-from ngswell.analytic import homogeneous_equilibrium, lagged_column_factor
-from ngswell.baths import Treatment
-from ngswell.problem import Problem, Snapshot
-from ngswell.stability import growth_factor
+from ngswell.analysis.stability import growth_factor
+from ngswell.baths.bath import Treatment
+from ngswell.closed_forms.homogeneous import homogeneous_equilibrium, lagged_column_factor
+from ngswell.physics import donnan
+from ngswell.problem.problem import Problem, Snapshot
 from studies import oscillation
 from studies.oscillation import measured_growth
 from studies.output import Findings, cost

@@ -33,9 +33,9 @@ from ngswell import (
     Result,
     Scene,
 )
-from ngswell.models import Model
-from ngswell.problem import Snapshot
-from ngswell.schemes import Scheme
+from ngswell.models.model import Model
+from ngswell.problem.problem import Snapshot
+from ngswell.stepping.schemes import Scheme
 from studies import boundary_charge, free_swelling
 from studies.free_swelling import END, HEIGHT, INITIAL, remodelled
 from studies.output import Findings, cost

@@ -65,16 +65,16 @@ from ngswell import (
     Scene,
     StepError,
     column,
-    donnan,
     rectangle,
 )
-from ngswell.baths import Treatment
-from ngswell.models import Model
+from ngswell.analysis.stability import growth_factor
+from ngswell.baths.bath import Treatment
+from ngswell.mesh.points import integral_on_boundary
+from ngswell.models.model import Model
 from ngswell.observers.base import Observer
-from ngswell.problem import Problem, Snapshot
-from ngswell.quadrature import integral_on_boundary
-from ngswell.stability import growth_factor
-from ngswell.stepping import StepReport
+from ngswell.physics import donnan
+from ngswell.problem.problem import Problem, Snapshot
+from ngswell.stepping.stepper import StepReport
 from studies import boundary_charge, free_swelling, oscillation
 from studies.output import Findings, cost
 

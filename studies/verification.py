@@ -46,16 +46,15 @@ from ngswell import (
     Uncharged,
     box,
     column,
-    donnan,
-    laws,
     rectangle,
-    series,
 )
-from ngswell.analytic import homogeneous_equilibrium
-from ngswell.kinematics import Kinematics
-from ngswell.linear import LinearColumn
-from ngswell.models import Model
-from ngswell.supports import Support
+from ngswell.closed_forms import consolidation
+from ngswell.closed_forms.homogeneous import homogeneous_equilibrium
+from ngswell.closed_forms.linear_column import LinearColumn
+from ngswell.models.model import Model
+from ngswell.physics import donnan, laws
+from ngswell.physics.kinematics import Kinematics
+from ngswell.setup.supports import Support
 from studies.manufactured import FAST, SLOW, errors, orders
 from studies.output import Findings, cost
 
@@ -114,7 +113,7 @@ EXACT = Newton(tolerance=1e-12)
 
 def extrapolated(scene: Scene, points: list[tuple[float, ...]], T: NDArray, step: float, results: list[Result]) -> NDArray:
     """p/load at the points (rows) and times T (in L²/c_v, L = 1 mm), from backward Euler with three steps."""
-    unit = 1 / series.consolidation_coefficient(DRAINED)
+    unit = 1 / consolidation.consolidation_coefficient(DRAINED)
     runs = []
     for part in (1, 2, 4):
         probes = [Probe(point, "p", when=list(T * unit)) for point in points]
@@ -135,15 +134,17 @@ def terzaghi(ax: Axes, results: list[Result]) -> dict[str, float]:
         loads=[Traction("top", (-LOAD,))],
     )
     T, heights = np.array([0.1, 0.2, 0.4, 0.8]), np.linspace(0, 0.95, 20)
-    unit = 1 / series.consolidation_coefficient(DRAINED)
+    unit = 1 / consolidation.consolidation_coefficient(DRAINED)
     found = extrapolated(scene, [(float(h),) for h in heights], T, 0.02, results)
     fine = np.linspace(0, 1, 101)
     errors = []
     for column_, t in enumerate(T):
-        ax.plot(series.terzaghi_pressure(DRAINED, 1.0, 1.0, fine, t * unit), fine, "k-", lw=0.8)
+        ax.plot(consolidation.terzaghi_pressure(DRAINED, 1.0, 1.0, fine, t * unit), fine, "k-", lw=0.8)
         ax.plot(found[:, column_], heights, "ko", ms=2)
         ax.annotate(f"{t:g}", (found[1, column_], 0.08), fontsize=7, ha="center", backgroundcolor="w")
-        errors.append(np.abs(found[:, column_] - series.terzaghi_pressure(DRAINED, 1.0, 1.0, heights, t * unit)).max())
+        errors.append(
+            np.abs(found[:, column_] - consolidation.terzaghi_pressure(DRAINED, 1.0, 1.0, heights, t * unit)).max()
+        )
     ax.set(xlabel="p / load", ylabel="height / L", title="Terzaghi, at $c_v t/L^2$", xlim=(0, 1.05))
     return {"terzaghi_error": float(max(errors))}
 
@@ -170,9 +171,9 @@ def cryer(ax: Axes, results: list[Result]) -> dict[str, float]:
     T = np.arange(1, 21) * 0.02
     found = 1 + extrapolated(scene, [(0.0, 0.0)], T, 0.01, results)[0]
     fine = np.linspace(0.002, 0.4, 200)
-    unit = 1 / series.consolidation_coefficient(DRAINED)
-    exact = series.cryer_pressure(DRAINED, 1.0, 1.0, 0.0, T * unit)
-    ax.plot(fine, series.cryer_pressure(DRAINED, 1.0, 1.0, 0.0, fine * unit), "k-", lw=0.8, label="series")
+    unit = 1 / consolidation.consolidation_coefficient(DRAINED)
+    exact = consolidation.cryer_pressure(DRAINED, 1.0, 1.0, 0.0, T * unit)
+    ax.plot(fine, consolidation.cryer_pressure(DRAINED, 1.0, 1.0, 0.0, fine * unit), "k-", lw=0.8, label="series")
     ax.plot(T, found, "ko", ms=2.5, label="computed")
     ax.set(xlabel="$c_v t/R^2$", ylabel="p at the centre / load", title="Cryer's sphere")
     ax.legend()

@@ -2,20 +2,8 @@
 
 from __future__ import annotations
 
-from ngswell import (
-    TABLE_1,
-    Bath,
-    Concentration,
-    Confined,
-    Penalty,
-    PlaneStrain,
-    Roller,
-    Scene,
-    Traction,
-    column,
-    donnan,
-    rectangle,
-)
+from ngswell import TABLE_1, Bath, Concentration, Confined, Penalty, PlaneStrain, Roller, Scene, Traction, column, rectangle
+from ngswell.physics import donnan
 
 WEAK = Penalty(1.0)
 P0 = donnan.pressure(0.15, 0.2, TABLE_1.RT)

@@ -9,12 +9,12 @@ from typing import ClassVar
 
 from ngsolve import H1, CoefficientFunction, FESpace, InnerProduct, Mesh, sqrt
 
-from ngswell import donnan, laws
-from ngswell.baths import Bath, BathFields, Frozen, Lagged, Multiplier, Nitsche, Penalty
-from ngswell.kinematics import Kinematics
-from ngswell.materials import Material
-from ngswell.models.mechanics import SolidState
-from ngswell.models.terms import Setting, Term, check_order, needs_salt
+from ngswell.baths.bath import Bath, BathFields, Frozen, Lagged, Multiplier, Nitsche, Penalty
+from ngswell.models.model import Setting, Term, check_order, needs_salt
+from ngswell.models.solid_state import SolidState
+from ngswell.physics import donnan, laws
+from ngswell.physics.kinematics import Kinematics
+from ngswell.physics.material import Material
 
 NEGLIGIBLE = 1e-3
 """Share of the cations by which anions may fall below zero: vanishing ones are the small difference of two fields."""
@@ -49,7 +49,7 @@ class State(SolidState):
         return laws.transport(self.material, self.nF, self.c, self.cfc, *gradients)
 
     def outputs(self) -> dict[str, CoefficientFunction]:
-        """Named fields in the current configuration; `ngswell.models.OUTPUT_UNITS` has their units."""
+        """Named fields in the current configuration; `ngswell.models.solid_state.OUTPUT_UNITS` has their units."""
         flux, anions = self.transport(self.push), self.c - self.cfc
         return {
             **self.solid_outputs(self.pore_pressure),

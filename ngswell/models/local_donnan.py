@@ -9,13 +9,13 @@ from typing import ClassVar
 
 from ngsolve import CoefficientFunction
 
-from ngswell import donnan, laws
-from ngswell.baths import Bath, BathFields
+from ngswell.baths.bath import Bath, BathFields
 from ngswell.errors import InputError
-from ngswell.materials import Material
-from ngswell.models.mechanics import SolidState
+from ngswell.models.model import Setting
 from ngswell.models.one_pressure import OnePressure
-from ngswell.models.terms import Setting
+from ngswell.models.solid_state import SolidState
+from ngswell.physics import donnan, laws
+from ngswell.physics.material import Material
 from ngswell.schedules import Blend
 
 
@@ -64,7 +64,7 @@ class State(SolidState):
         return -K / (1 + drag) * (frame * self.drive(self.P))
 
     def outputs(self) -> dict[str, CoefficientFunction]:
-        """Named fields in the current configuration; `ngswell.models.OUTPUT_UNITS` has their units."""
+        """Named fields in the current configuration; `ngswell.models.solid_state.OUTPUT_UNITS` has their units."""
         return {
             **self.solid_outputs(self.pore_pressure),
             "p": self.pore_pressure,

@@ -8,10 +8,10 @@ from typing import Any, ClassVar
 
 from ngsolve import H1, CoefficientFunction, FESpace, InnerProduct, Mesh
 
-from ngswell.baths import BathFields, Essential, Penalty
-from ngswell.kinematics import Kinematics
-from ngswell.materials import Material
-from ngswell.models.terms import Term, check_order
+from ngswell.baths.bath import BathFields, Essential, Penalty
+from ngswell.models.model import Term, check_order
+from ngswell.physics.kinematics import Kinematics
+from ngswell.physics.material import Material
 
 
 @dataclass(frozen=True)

@@ -8,12 +8,12 @@ from typing import ClassVar
 
 from ngsolve import CoefficientFunction
 
-from ngswell.baths import Bath
+from ngswell.baths.bath import Bath
 from ngswell.errors import InputError
-from ngswell.materials import Material
-from ngswell.models.mechanics import SolidState
+from ngswell.models.model import Setting
 from ngswell.models.one_pressure import OnePressure
-from ngswell.models.terms import Setting
+from ngswell.models.solid_state import SolidState
+from ngswell.physics.material import Material
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class State(SolidState):
         return -self.permeability * (frame * self.drive(self.p))
 
     def outputs(self) -> dict[str, CoefficientFunction]:
-        """Named fields in the current configuration; `ngswell.models.OUTPUT_UNITS` has their units."""
+        """Named fields in the current configuration; `ngswell.models.solid_state.OUTPUT_UNITS` has their units."""
         return {**self.solid_outputs(self.p), "p": self.p, "seepage": self.seepage(self.push)}
 
 

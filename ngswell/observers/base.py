@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from ngswell import checks
 from ngswell.errors import InputError
-from ngswell.problem import Problem
+from ngswell.problem.problem import Problem
 from ngswell.schedules import LARGEST
-from ngswell.stepping import StepReport
+from ngswell.stepping.stepper import StepReport
 
 MOST_RECORDS = 10**6
 """Records that an interval may ask for."""

@@ -9,11 +9,11 @@ import numpy as np
 from ngsolve import L2, VOL, GridFunction
 from numpy.typing import NDArray
 
+from ngswell.analysis.recovery import Recovery
 from ngswell.errors import InputError
-from ngswell.indicator import Recovery
+from ngswell.mesh.points import vertices_of
 from ngswell.observers.base import Observer
-from ngswell.problem import Problem
-from ngswell.quadrature import vertices_of
+from ngswell.problem.problem import Problem
 
 LARGEST_PART = 1 / 5
 """With half of the squared error in more than this share of the cells, no part of the mesh stands out."""
@@ -37,7 +37,7 @@ class Worst(NamedTuple):
 
 
 class Coarseness(Observer):
-    """Estimated errors in space (`ngswell.indicator.Recovery`), relative to each gradient's largest norm of the run.
+    """Estimated errors in space (`ngswell.analysis.recovery.Recovery`), relative to each gradient's largest norm of the run.
 
         coarseness = Coarseness()
         scene.run(until=8000, observers=[coarseness])

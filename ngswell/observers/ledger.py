@@ -6,10 +6,10 @@ import numpy as np
 from ngsolve import BilinearForm
 from numpy.typing import NDArray
 
+from ngswell.mesh.points import vertices_of
 from ngswell.observers.base import Observer
-from ngswell.problem import Problem, Snapshot
-from ngswell.quadrature import vertices_of
-from ngswell.stepping import StepReport
+from ngswell.problem.problem import Problem, Snapshot
+from ngswell.stepping.stepper import StepReport
 
 
 class Ledger(Observer):

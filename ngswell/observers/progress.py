@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from ngswell.observers.base import Observer
-from ngswell.problem import Problem
-from ngswell.stepping import StepReport, why
+from ngswell.problem.problem import Problem
+from ngswell.stepping.stepper import StepReport, why
 
 
 class Progress(Observer):

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from ngswell import checks
 from ngswell.errors import InputError
+from ngswell.mesh.points import integral_on_boundary
 from ngswell.observers.base import Observer
-from ngswell.problem import Problem, Snapshot
-from ngswell.quadrature import integral_on_boundary
+from ngswell.problem.problem import Problem, Snapshot
 
 
 def _output(problem: Problem, name: str) -> CoefficientFunction:
@@ -26,7 +26,7 @@ class Probe(Observer):
     """Quantities at a point of the reference configuration [mm].
 
     `Probe((1.1, 0.5), "J", "p")`; then `probe.time` and `probe.values["J"]` are arrays, one row a record. Quantities and
-    units are those of `ngswell.models.OUTPUT_UNITS`.
+    units are those of `ngswell.models.solid_state.OUTPUT_UNITS`.
     """
 
     def __init__(self, point: Sequence[float], *quantities: str, when: float | Sequence[float] | None = None) -> None:

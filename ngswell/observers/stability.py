@@ -9,11 +9,11 @@ from math import inf
 import numpy as np
 from numpy.typing import NDArray
 
-from ngswell.baths import Lagged
+from ngswell.analysis.stability import Instability, Perturbations
+from ngswell.baths.bath import Lagged
 from ngswell.errors import REMEDY, InputError, InstabilityError
 from ngswell.observers.base import Observer
-from ngswell.problem import Problem
-from ngswell.stability import Instability, Perturbations
+from ngswell.problem.problem import Problem
 
 FOLLOWED = 0.5
 """Largest growth s Δt within a stage of size Δt that counts as followed: backward Euler then multiplies by 2, not by 1.65.
@@ -55,7 +55,7 @@ class Stability(Observer):
             if isinstance(problem.scene.treatment(bath), Lagged):
                 raise InputError(
                     f"Stability: the bath on {bath.boundary!r} is Lagged, a condition that looks back one step; "
-                    "ngswell.stability.growth_factor tells what a step does to a perturbation"
+                    "ngswell.analysis.stability.growth_factor tells what a step does to a perturbation"
                 )
         self._slowest = 1 / (until - begin if self.over is None else self.over)
         self._perturbations = Perturbations(problem)

@@ -15,7 +15,7 @@ from ngswell import checks
 from ngswell.errors import InputError, OutputError
 from ngswell.files import check_folder, replacing
 from ngswell.observers.base import Observer
-from ngswell.problem import Problem
+from ngswell.problem.problem import Problem
 
 
 class VTK(Observer):

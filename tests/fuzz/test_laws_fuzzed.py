@@ -13,9 +13,10 @@ from hypothesis import example
 from hypothesis import strategies as st
 from ngsolve import CF, Det
 
-from ngswell import HolmesMow, MackieMeares, Material, PowerLaw, donnan, laws, rectangle
-from ngswell.analytic import FREE_DIRECTIONS, homogeneous_equilibrium
-from ngswell.materials import GAS_CONSTANT
+from ngswell import HolmesMow, MackieMeares, Material, PowerLaw, rectangle
+from ngswell.closed_forms.homogeneous import FREE_DIRECTIONS, homogeneous_equilibrium
+from ngswell.physics import donnan, laws
+from ngswell.physics.material import GAS_CONSTANT
 
 EPS = np.finfo(float).eps
 RT = GAS_CONSTANT * 298.0

@@ -26,10 +26,10 @@ from ngswell import (
     StepError,
     Traction,
     column,
-    donnan,
 )
-from ngswell.newton import Outcome
-from ngswell.solvers import LinearSolver
+from ngswell.physics import donnan
+from ngswell.solve.direct import LinearSolver
+from ngswell.solve.newton import Outcome
 
 SOFT = replace(TABLE_1, lam=0.0, cfc0=0.0)
 """Nothing keeps it from the compression point."""

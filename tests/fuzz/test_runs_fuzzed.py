@@ -55,9 +55,9 @@ from ngswell import (
     column,
     rectangle,
 )
-from ngswell.materials import Constant
-from ngswell.observers import Observer
-from ngswell.schemes import Scheme
+from ngswell.observers.base import Observer
+from ngswell.physics.material import Constant
+from ngswell.stepping.schemes import Scheme
 from studies.hard import unusable
 
 MOST_STEPS = 8

@@ -59,9 +59,9 @@ from ngswell import (
     column,
     rectangle,
 )
-from ngswell.analytic import homogeneous_equilibrium
-from ngswell.materials import _RANGES, Constant
-from ngswell.observers import Observer
+from ngswell.closed_forms.homogeneous import homogeneous_equilibrium
+from ngswell.observers.base import Observer
+from ngswell.physics.material import _RANGES, Constant
 
 PARAMETERS = tuple(field.name for field in fields(Material) if field.name in _RANGES)
 FIELDS = PARAMETERS[:7]

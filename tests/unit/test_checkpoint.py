@@ -37,8 +37,8 @@ from ngswell import (
     TwoLevelSolver,
     read_checkpoint,
 )
-from ngswell.observers import Observer
-from ngswell.solvers import CondensedSolver, LinearSolver, best_solver
+from ngswell.observers.base import Observer
+from ngswell.solve.direct import CondensedSolver, LinearSolver, best_solver
 
 FALLING = Ramp((0, 0.15), (10, 0.125))
 
@@ -236,7 +236,7 @@ def test_another_scene_is_named_by_the_part_that_differs(written, changes, part)
 def test_fields_of_position_and_laws_count_by_their_values():
     def digest(**changes):
         material = replace(ngswell.TABLE_1, **changes)
-        return ngswell.restart.parts(confined_column(cells=4, material=material))["material"]
+        return ngswell.run.restart.parts(confined_column(cells=4, material=material))["material"]
 
     stiff = ngsolve.x + 0.24
     assert digest(mu=stiff) == digest(mu=0.24 + ngsolve.x)
@@ -244,7 +244,7 @@ def test_fields_of_position_and_laws_count_by_their_values():
     assert digest(permeability=lambda K, J, nS: K * J) != digest(permeability=lambda K, J, nS: K * J * J)
     blend = [ngswell.Blend(Ramp((0, 0.15)), Ramp((0, 0.15), (9, 0.1)), weight) for weight in (2 * ngsolve.x, ngsolve.x)]
     scenes = [confined_column(cells=4, baths=[Bath("top", c=c)], initial=(0.15, 0.0)) for c in blend]
-    one, other = (ngswell.restart.parts(scene) for scene in scenes)
+    one, other = (ngswell.run.restart.parts(scene) for scene in scenes)
     assert {name for name in one if one[name] != other[name]} == {"baths"}
 
 

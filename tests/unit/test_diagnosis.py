@@ -29,8 +29,8 @@ from ngswell import (
     from_occ,
     rectangle,
 )
-from ngswell.diagnosis import connected_parts, singular_mode
-from ngswell.quadrature import points, points_and_corners
+from ngswell.analysis.diagnosis import connected_parts, singular_mode
+from ngswell.mesh.points import points, points_and_corners
 
 NO_CHARGE = Material(mu=0.24, lam=0.02, nS0=0.25, cfc0=0.0, D_plus=5e-4, D_minus=8e-4, K=1e-3)
 MODELS = {
@@ -172,7 +172,7 @@ def test_a_run_ends_before_a_cell_turns_over(monkeypatch):
         scene.run(1e4, Fixed(1e3))
     assert content_at_corners(scene) > 0
     # Control: watched at the forms' own points alone, the run passes with a corner turned inside out, J = −0.24.
-    monkeypatch.setattr("ngswell.problem.points_and_corners", lambda mesh, order: points(mesh, VOL, order))
+    monkeypatch.setattr("ngswell.problem.problem.points_and_corners", lambda mesh, order: points(mesh, VOL, order))
     scene = crushed(3.0)
     scene.run(1e4, Fixed(1e3))
     assert content_at_corners(scene) < -TABLE_1.nS0

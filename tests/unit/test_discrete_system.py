@@ -39,8 +39,8 @@ from ngswell import (
     column,
     rectangle,
 )
-from ngswell.solvers import CondensedSolver, LinearSolver, best_solver, solver_of
-from ngswell.weak import normal_size
+from ngswell.baths.weak import normal_size
+from ngswell.solve.direct import CondensedSolver, LinearSolver, best_solver, solver_of
 
 
 def block(**changes) -> Scene:

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from ngsolve import CF, x
 
-from ngswell import TABLE_1, donnan, rectangle
+from ngswell import TABLE_1, rectangle
+from ngswell.physics import donnan
 
 ROUND_OFF = 1e-14
 

@@ -29,7 +29,7 @@ from ngswell import (
     from_occ,
     rectangle,
 )
-from ngswell.indicator import Recovery, indicator
+from ngswell.analysis.recovery import Recovery, indicator
 
 
 def pentagon():

@@ -22,8 +22,8 @@ from ngswell import (
     box,
     rectangle,
 )
-from ngswell.krylov import EASY, MOST_ITERATIONS, TwoLevelSolver, gmres, units
-from ngswell.solvers import LinearSolver, solver_of
+from ngswell.solve.direct import LinearSolver, solver_of
+from ngswell.solve.two_level import EASY, MOST_ITERATIONS, TwoLevelSolver, gmres, units
 
 DILUTION = Ramp((0, 4.1), (80, 2.7))
 

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from ngsolve import CF, Det, Inv
 
-from ngswell import TABLE_1, TABLE_2, laws, rectangle
+from ngswell import TABLE_1, TABLE_2, rectangle
+from ngswell.physics import laws
 
 MESH = rectangle(1, 1, 1, 1)  # a mesh point does not keep its mesh alive
 POINT = MESH(0.3, 0.4)

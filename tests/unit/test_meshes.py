@@ -36,7 +36,7 @@ from ngswell import (
     read_mesh,
     rectangle,
 )
-from ngswell.analytic import homogeneous_equilibrium
+from ngswell.closed_forms.homogeneous import homogeneous_equilibrium
 from ngswell.plotting import on_deformed_body
 
 # -- meshes of one body, with the sizes of their sides -------------------------------------------------------------------

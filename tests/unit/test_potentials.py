@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from ngsolve import CF, cos, exp, sin, x, y
 
-from ngswell import TABLE_2, HolmesMow, MackieMeares, PowerLaw, donnan, laws, rectangle
+from ngswell import TABLE_2, HolmesMow, MackieMeares, PowerLaw, rectangle
+from ngswell.physics import donnan, laws
 
 MESH = rectangle(1.0, 1.0, 1, 1)  # a mesh point does not keep its mesh alive
 POINTS = [MESH(*place) for place in np.random.default_rng(0).uniform(size=(20, 2))]

@@ -47,8 +47,8 @@ from ngswell import (
     column,
     rectangle,
 )
-from ngswell.analytic import homogeneous_equilibrium
-from ngswell.stability import growth_factor
+from ngswell.analysis.stability import growth_factor
+from ngswell.closed_forms.homogeneous import homogeneous_equilibrium
 
 GOOD = {"mu": 0.24, "lam": 0.02, "nS0": 0.25, "cfc0": 0.2, "D_plus": 5e-4, "D_minus": 8e-4, "K": 1e-3}
 

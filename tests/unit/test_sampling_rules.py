@@ -19,11 +19,11 @@ from ngswell import (
     Symmetry,
     box,
     column,
-    donnan,
     rectangle,
 )
-from ngswell.quadrature import vertices
-from ngswell.sampling_rules import BathBoundary, Slopes
+from ngswell.baths.sampling import BathBoundary, Slopes
+from ngswell.mesh.points import vertices
+from ngswell.physics import donnan
 
 RULES = [InnerLayer(), Averaged(), LeastSquares()]
 

@@ -28,11 +28,11 @@ from ngswell import (
     Traction,
     Uncharged,
     column,
-    laws,
     rectangle,
-    series,
 )
-from ngswell.models.terms import Term
+from ngswell.closed_forms import consolidation
+from ngswell.models.model import Term
+from ngswell.physics import laws
 from studies.verification import quarter_disc
 
 SOLID = {"mu": 0.24, "lam": 0.16, "nS0": 0.25, "cfc0": 0.0, "D_plus": 5e-4, "D_minus": 8e-4}
@@ -46,7 +46,7 @@ FAR = 3e-3
 
 def histories(scene, probes, dT, until):
     """Rows of what `probes` (point, quantity, component, unit) see at multiples of dT[0], computed with steps of dT[1]."""
-    scale = 1 / series.consolidation_coefficient(MATERIAL)  # L = 1 mm
+    scale = 1 / consolidation.consolidation_coefficient(MATERIAL)  # L = 1 mm
     interval, step = dT
     times = np.arange(1, round(until / interval) + 1) * interval
     seen = [Probe(point, quantity, when=list(times * scale)) for point, quantity, *_ in probes]
@@ -77,7 +77,7 @@ def halved(scene, probes, exact, dT, until, after):
 
 
 def seconds(T):
-    return T / series.consolidation_coefficient(MATERIAL)
+    return T / consolidation.consolidation_coefficient(MATERIAL)
 
 
 # -- the linear limit, and the series themselves -------------------------------------------------------------------------
@@ -128,11 +128,11 @@ def test_series_agree_with_their_laplace_transforms(mu, lam):
         return s * (np.sinh(q) - eta * (q * np.cosh(q) - np.sinh(q)) / s), (q * np.cosh(q) - np.sinh(q)) / s
 
     transforms = {
-        series.terzaghi_pressure: lambda s, xi: (1 - np.cosh(np.sqrt(s) * xi) / np.cosh(np.sqrt(s))) / s,
-        series.mandel_pressure: mandel,
-        series.cryer_pressure: lambda s, xi: (np.sinh(np.sqrt(s)) - np.sinh(np.sqrt(s) * xi) / xi) / sphere(s)[0],
+        consolidation.terzaghi_pressure: lambda s, xi: (1 - np.cosh(np.sqrt(s) * xi) / np.cosh(np.sqrt(s))) / s,
+        consolidation.mandel_pressure: mandel,
+        consolidation.cryer_pressure: lambda s, xi: (np.sinh(np.sqrt(s)) - np.sinh(np.sqrt(s) * xi) / xi) / sphere(s)[0],
     }
-    unit = 1.3**2 / series.consolidation_coefficient(material)
+    unit = 1.3**2 / consolidation.consolidation_coefficient(material)
     for T in (1e-3, 0.02, 0.5):
         for pressure, transform in transforms.items():
             for xi in (1e-6, 0.3, 0.9):
@@ -140,32 +140,36 @@ def test_series_agree_with_their_laplace_transforms(mu, lam):
                 # 1e-10 of cancellation in sinh(q ξ)/ξ near the centre
                 assert pressure(material, 1.0, 1.3, 1.3 * xi, T * unit) == pytest.approx(inverse, abs=1e-9)
         settled = inverse_laplace(lambda s: sphere(s)[1] / sphere(s)[0] / modulus, T)
-        assert series.cryer_settlement(material, 1.0, 1.3, T * unit) / 1.3 == pytest.approx(settled, rel=1e-9)
+        assert consolidation.cryer_settlement(material, 1.0, 1.3, T * unit) / 1.3 == pytest.approx(settled, rel=1e-9)
         settled = inverse_laplace(shortening, T)
-        assert series.mandel_shortening(material, 1.0, 1.3, T * unit) == pytest.approx(settled, rel=1e-9)
+        assert consolidation.mandel_shortening(material, 1.0, 1.3, T * unit) == pytest.approx(settled, rel=1e-9)
         settled = inverse_laplace(lambda s: np.tanh(np.sqrt(s)) / np.sqrt(s) / s / modulus, T)
-        assert series.terzaghi_settlement(material, 1.0, 1.3, T * unit) / 1.3 == pytest.approx(settled, rel=1e-9)
+        assert consolidation.terzaghi_settlement(material, 1.0, 1.3, T * unit) / 1.3 == pytest.approx(settled, rel=1e-9)
 
 
 def test_series_begin_undrained():
-    assert series.terzaghi_pressure(MATERIAL, 2.0, 1.0, [0.0, 0.5], seconds(1e-4)) == pytest.approx([2.0, 2.0], rel=1e-12)
+    assert consolidation.terzaghi_pressure(MATERIAL, 2.0, 1.0, [0.0, 0.5], seconds(1e-4)) == pytest.approx(
+        [2.0, 2.0], rel=1e-12
+    )
     # What leaves through the boundary layer stiffens the rim by √T and squeezes the middle: shrinking with √T.
     for T in (1e-4, 1e-6):
-        assert series.mandel_pressure(MATERIAL, 2.0, 1.0, 0.0, seconds(T)) == pytest.approx(1.0, rel=2 * T**0.5)
-        assert series.mandel_shortening(MATERIAL, 2.0, 1.0, seconds(T)) == pytest.approx(2.0 / (4 * 0.24), rel=2 * T**0.5)
-        assert series.cryer_pressure(MATERIAL, 2.0, 1.0, 0.0, seconds(T)) == pytest.approx(2.0, rel=4 * T**0.5)
-        assert series.cryer_settlement(MATERIAL, 2.0, 1.0, seconds(T)) == pytest.approx(0.0, abs=4 * T**0.5 / M)
+        assert consolidation.mandel_pressure(MATERIAL, 2.0, 1.0, 0.0, seconds(T)) == pytest.approx(1.0, rel=2 * T**0.5)
+        assert consolidation.mandel_shortening(MATERIAL, 2.0, 1.0, seconds(T)) == pytest.approx(
+            2.0 / (4 * 0.24), rel=2 * T**0.5
+        )
+        assert consolidation.cryer_pressure(MATERIAL, 2.0, 1.0, 0.0, seconds(T)) == pytest.approx(2.0, rel=4 * T**0.5)
+        assert consolidation.cryer_settlement(MATERIAL, 2.0, 1.0, seconds(T)) == pytest.approx(0.0, abs=4 * T**0.5 / M)
 
 
 def test_series_refuse_what_they_cannot_mean():
     with pytest.raises(InputError, match="position"):
-        series.terzaghi_pressure(MATERIAL, LOAD, 1.0, 1.1, 1.0)
+        consolidation.terzaghi_pressure(MATERIAL, LOAD, 1.0, 1.1, 1.0)
     with pytest.raises(InputError, match="later time"):
-        series.cryer_pressure(MATERIAL, LOAD, 1.0, 0.0, [0.0, 1.0])
+        consolidation.cryer_pressure(MATERIAL, LOAD, 1.0, 0.0, [0.0, 1.0])
     with pytest.raises(InputError, match="radius"):
-        series.cryer_settlement(MATERIAL, LOAD, -1.0, 1.0)
+        consolidation.cryer_settlement(MATERIAL, LOAD, -1.0, 1.0)
     with pytest.raises(InputError, match="varies in space"):
-        series.mandel_pressure(Material(**SOLID, K=CF(1e-3)), LOAD, 1.0, 0.0, 1.0)
+        consolidation.mandel_pressure(Material(**SOLID, K=CF(1e-3)), LOAD, 1.0, 0.0, 1.0)
 
 
 # -- Terzaghi ------------------------------------------------------------------------------------------------------------
@@ -193,8 +197,8 @@ def terzaghi(cells=20, order=3, flat=True, material=MATERIAL):
 
 def terzaghi_exact(T, material=MATERIAL):
     """The same rows from the series, at the times that T means for MATERIAL."""
-    rows = [series.terzaghi_pressure(material, LOAD, 1.0, z, seconds(T)) / LOAD for z in HEIGHTS]
-    return np.array([*rows, series.terzaghi_settlement(material, LOAD, 1.0, seconds(T)) / (LOAD / M)])
+    rows = [consolidation.terzaghi_pressure(material, LOAD, 1.0, z, seconds(T)) / LOAD for z in HEIGHTS]
+    return np.array([*rows, consolidation.terzaghi_settlement(material, LOAD, 1.0, seconds(T)) / (LOAD / M)])
 
 
 @pytest.mark.parametrize("flat", [True, False])
@@ -260,8 +264,8 @@ def mandel(tension=1e6, cells=16):
 
 
 def mandel_exact(T):
-    rows = [series.mandel_pressure(MATERIAL, LOAD, 1.0, x, seconds(T)) / LOAD for x in PLACES]
-    return np.array([*rows, *[series.mandel_shortening(MATERIAL, LOAD, 1.0, seconds(T)) / (LOAD / M)] * 2])
+    rows = [consolidation.mandel_pressure(MATERIAL, LOAD, 1.0, x, seconds(T)) / LOAD for x in PLACES]
+    return np.array([*rows, *[consolidation.mandel_shortening(MATERIAL, LOAD, 1.0, seconds(T)) / (LOAD / M)] * 2])
 
 
 def test_mandel():
@@ -312,8 +316,8 @@ def cryer(refinements=1, order=4, kinematics=None):
 
 def cryer_exact(T):
     """The same rows from the series; p as it is computed, counted from no load instead of from the bath."""
-    rows = [series.cryer_pressure(MATERIAL, LOAD, 1.0, r, seconds(T)) / LOAD - 1 for r in (0.0, 0.5, 0.5, 0.5)]
-    return np.array([*rows, *[series.cryer_settlement(MATERIAL, LOAD, 1.0, seconds(T)) / (LOAD / M)] * 2])
+    rows = [consolidation.cryer_pressure(MATERIAL, LOAD, 1.0, r, seconds(T)) / LOAD - 1 for r in (0.0, 0.5, 0.5, 0.5)]
+    return np.array([*rows, *[consolidation.cryer_settlement(MATERIAL, LOAD, 1.0, seconds(T)) / (LOAD / M)] * 2])
 
 
 def test_cryer():

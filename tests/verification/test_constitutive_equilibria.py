@@ -33,12 +33,11 @@ from ngswell import (
     Traction,
     Uncharged,
     column,
-    donnan,
-    laws,
     rectangle,
 )
-from ngswell.analytic import homogeneous_equilibrium, lagged_column_factor
-from ngswell.stability import growth_factor
+from ngswell.analysis.stability import growth_factor
+from ngswell.closed_forms.homogeneous import homogeneous_equilibrium, lagged_column_factor
+from ngswell.physics import donnan, laws
 
 REAL = {"phi": 0.85, "phi_bath": 0.95, "Gamma": 1.1}
 CHOICES = [

@@ -28,9 +28,9 @@ from ngswell import (
     Symmetry,
     rectangle,
 )
-from ngswell.analytic import homogeneous_equilibrium
+from ngswell.closed_forms.homogeneous import homogeneous_equilibrium
 from ngswell.models import concentration
-from ngswell.problem import Snapshot
+from ngswell.problem.problem import Snapshot
 
 CHOICES = {
     "Concentration": (Concentration(), None),

@@ -31,7 +31,7 @@ from ngswell import (
     column,
     rectangle,
 )
-from ngswell.analytic import homogeneous_equilibrium
+from ngswell.closed_forms.homogeneous import homogeneous_equilibrium
 
 FALLING = Ramp((0, 0.15), (10, 0.125))
 

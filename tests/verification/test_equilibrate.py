@@ -31,7 +31,7 @@ from ngswell import (
     Traction,
     rectangle,
 )
-from ngswell.analytic import homogeneous_equilibrium
+from ngswell.closed_forms.homogeneous import homogeneous_equilibrium
 
 
 def block(model=None, material=TABLE_2, supports=None, **changes):

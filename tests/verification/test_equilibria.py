@@ -30,7 +30,7 @@ from ngswell import (
     column,
     rectangle,
 )
-from ngswell.analytic import homogeneous_equilibrium
+from ngswell.closed_forms.homogeneous import homogeneous_equilibrium
 
 
 @pytest.mark.parametrize(

@@ -22,7 +22,7 @@ from ngswell import (
     column,
     rectangle,
 )
-from ngswell.indicator import Recovery
+from ngswell.analysis.recovery import Recovery
 from studies import free_swelling
 
 SHAPES = {

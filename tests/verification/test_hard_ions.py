@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from ngswell import TABLE_1, Adaptive, Fixed, Ledger, Newton, Penalty, Probe, Ramp, StepError, column
-from ngswell.linear import LinearColumn, conductance
-from ngswell.stepping import _following
+from ngswell.closed_forms.linear_column import LinearColumn, conductance
+from ngswell.stepping.stepper import _following
 from studies.hard import CHOICES
 from studies.hard_ions import (
     BATH,

@@ -3,7 +3,7 @@
 import pytest
 
 from ngswell import Adaptive, StepError
-from ngswell.analytic import homogeneous_equilibrium
+from ngswell.closed_forms.homogeneous import homogeneous_equilibrium
 from studies import hard_mechanics
 from studies.hard import CHOICES, DEFAULTS, unusable
 

@@ -9,8 +9,8 @@ from conftest import strip
 from ngsolve import CF, y
 
 from ngswell import TABLE_2, Bath, Fixed, InputError, InstabilityError, Lagged, Potential, Snapshots, Stability
-from ngswell.analytic import homogeneous_equilibrium
-from ngswell.stability import Perturbations
+from ngswell.analysis.stability import Perturbations
+from ngswell.closed_forms.homogeneous import homogeneous_equilibrium
 from studies.convergence import growth_rates, held_sideways, swell
 from studies.hard_wrinkles import CELLS, SKINNED, refinement, unresolved, wrinkles
 

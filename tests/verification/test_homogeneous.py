@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from ngswell import LocalDonnan, Potential, laws
-from ngswell.analytic import homogeneous_equilibrium
+from ngswell import LocalDonnan, Potential
+from ngswell.closed_forms.homogeneous import homogeneous_equilibrium
+from ngswell.physics import laws
 from studies.verification import gel, homogeneous_body, printed_drive, unrest
 
 

@@ -26,12 +26,12 @@ from ngswell import (
     Scene,
     Symmetry,
     Traction,
-    donnan,
     rectangle,
 )
-from ngswell.analytic import homogeneous_equilibrium, lagged_column_factor
-from ngswell.problem import Snapshot
-from ngswell.stability import growth_factor, leading_eigenvalues
+from ngswell.analysis.stability import growth_factor, leading_eigenvalues
+from ngswell.closed_forms.homogeneous import homogeneous_equilibrium, lagged_column_factor
+from ngswell.physics import donnan
+from ngswell.problem.problem import Snapshot
 from studies.oscillation import disturbed, measured_growth
 
 SOFT = replace(TABLE_1, mu=0.06)

@@ -1,4 +1,4 @@
-"""Coupled transport of fluid and ions against the closed forms of `ngswell.linear`, derived in docs/linear_column.md."""
+"""Coupled transport of fluid and ions against closed forms (`closed_forms.linear_column`, docs/linear_column.md)."""
 
 from dataclasses import replace
 from functools import cached_property
@@ -28,12 +28,19 @@ from ngswell import (
     Scene,
     Traction,
     column,
-    donnan,
-    laws,
 )
-from ngswell.analytic import homogeneous_equilibrium
-from ngswell.linear import LinearColumn, conductance, diffusivities, penalty_efflux, potentials, storage, uniform_gel_fluxes
-from ngswell.problem import Snapshot
+from ngswell.closed_forms.homogeneous import homogeneous_equilibrium
+from ngswell.closed_forms.linear_column import (
+    LinearColumn,
+    conductance,
+    diffusivities,
+    penalty_efflux,
+    potentials,
+    storage,
+    uniform_gel_fluxes,
+)
+from ngswell.physics import donnan, laws
+from ngswell.problem.problem import Snapshot
 
 HEIGHT, BATH = 0.5, 0.15  # mm, mol/l
 CLOSED = LinearColumn(TABLE_1, BATH, HEIGHT)

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from ngsolve import CF
 
-from ngswell import Axisymmetric, PlaneStrain, Solid, laws
-from ngswell import kinematics as motions
-from ngswell.quadrature import points
+from ngswell import Axisymmetric, PlaneStrain, Solid
+from ngswell.mesh.points import points
+from ngswell.physics import kinematics as motions
+from ngswell.physics import laws
 from studies.manufactured import (
     BATH,
     FAST,

@@ -5,8 +5,10 @@ The same cases and sources as in test_manufactured.py, from equations written a 
 
 import pytest
 
-from ngswell import Concentration, Essential, Multiplier, Nitsche, Penalty, PlaneStrain, laws, weak
+from ngswell import Concentration, Essential, Multiplier, Nitsche, Penalty, PlaneStrain
+from ngswell.baths import weak
 from ngswell.models import potential
+from ngswell.physics import laws
 from studies.manufactured import (
     BATH,
     FAST,

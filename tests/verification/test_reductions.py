@@ -31,12 +31,11 @@ from ngswell import (
     Traction,
     Uncharged,
     column,
-    donnan,
-    laws,
     rectangle,
 )
-from ngswell.analytic import homogeneous_equilibrium
+from ngswell.closed_forms.homogeneous import homogeneous_equilibrium
 from ngswell.models.local_donnan import State
+from ngswell.physics import donnan, laws
 from studies.reductions import effective
 
 WEAK = Penalty(relative=1e4)

@@ -27,9 +27,9 @@ from ngswell import (
     column,
     rectangle,
 )
-from ngswell.analytic import homogeneous_equilibrium, lagged_column_factor
+from ngswell.analysis.stability import growth_factor
+from ngswell.closed_forms.homogeneous import homogeneous_equilibrium, lagged_column_factor
 from ngswell.models.concentration import State
-from ngswell.stability import growth_factor
 from studies.oscillation import disturbed, measured_growth
 
 FALLING = Ramp((0, 0.15), (10, 0.125))

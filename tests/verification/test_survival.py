@@ -28,7 +28,7 @@ ngsolve.SetNumThreads(1)  # with more threads two runs differ in the last digits
 import numpy as np
 from conftest import strip
 from ngswell import *
-from ngswell.observers import Observer
+from ngswell.observers.base import Observer
 
 class Ballast(Observer):
     "Makes a checkpoint large, so that kills hit its writing."
@@ -138,7 +138,7 @@ HANGING = (
     SCRIPT[: SCRIPT.index("result = ")]
     + """
 import signal, time
-from ngswell.stepping import Stepper
+from ngswell.stepping.stepper import Stepper
 
 def linearise(*arguments, found=ngsolve.BilinearForm.AssembleLinearization):
     if scene.problem.time > 1.0:

@@ -33,9 +33,9 @@ from ngswell import (
     Symmetry,
     box,
     rectangle,
-    weak,
 )
-from ngswell.quadrature import points
+from ngswell.baths import weak
+from ngswell.mesh.points import points
 
 SYMMETRIC = [Symmetry("left"), Symmetry("bottom")]
 BODIES = {

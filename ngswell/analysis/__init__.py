@@ -1,0 +1,1 @@
+"""What a state tells: stability, estimated errors, why a step fails."""

@@ -1,0 +1,1 @@
+"""Salt baths on boundaries, and the ways of imposing Donnan equilibrium there; one treatment a file."""

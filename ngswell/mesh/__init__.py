@@ -1,0 +1,1 @@
+"""Meshes: shapes and Gmsh files, and their points, vertices and parts."""

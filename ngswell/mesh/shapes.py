@@ -1,0 +1,238 @@
+"""Meshes with named boundaries: structured and graded, from CAD shapes; and the check that their cells are sound."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from math import log, prod
+from typing import Any
+
+import numpy as np
+from netgen.occ import OCCGeometry, TopoDS_Shape
+from ngsolve import ET, VOL, ElementId, IntegrationRule, Mesh, specialcf
+from ngsolve.meshes import Make1DMesh, MakeStructured2DMesh, MakeStructured3DMesh
+from numpy.typing import NDArray
+
+from ngswell import checks
+from ngswell.errors import InputError
+from ngswell.mesh.points import with_corners
+
+Grade = dict[str, float]
+"""Boundary name → how many times thinner the cell at that boundary is than the largest of its row [-]."""
+
+SIZES = (1e-6, 1e6)
+"""Sizes that a body may have [mm]."""
+
+MOST_CELLS = 10**7
+"""Cells that a mesh may have."""
+
+_CELLS = {
+    1: {"segment": ET.SEGM},
+    2: {"triangle": ET.TRIG, "quadrilateral": ET.QUAD},
+    3: {"tetrahedron": ET.TET, "hexahedron": ET.HEX, "prism": ET.PRISM, "pyramid": ET.PYRAMID},
+}
+
+
+def column(height: float, cells: int, grade: Grade | None = None) -> Mesh:
+    """A segment of `height` [mm] with boundaries "bottom" (x = 0) and "top".
+
+    `grade={"top": 10}` thins the cells in a geometric progression: the one at the top has a tenth of the length of the
+    largest, at the bottom. Towards both ends, the largest is in the middle.
+    """
+    (height,), (cells,) = _checked_sizes("column", (height,), (cells,))
+    (nodes,) = _graded("column", (height,), (cells,), (("bottom", "top"),), grade)
+    mesh = Make1DMesh(cells, mapping=lambda s: nodes[round(cells * s)])
+    for number, name in enumerate(("bottom", "top")):
+        mesh.ngmesh.SetBCName(number, name)
+    return mesh
+
+
+def rectangle(
+    width: float,
+    height: float,
+    nx: int,
+    ny: int,
+    triangles: bool = False,
+    grade: Grade | None = None,
+    lines: dict[str, float] | None = None,
+) -> Mesh:
+    """Cells on [0, width] × [0, height] [mm] with boundaries "bottom", "right", "top", "left".
+
+    Quadrilaterals, or `triangles`, two in each. `grade` thins the cells towards boundaries, as in `column`.
+    `lines={"x": 0.3}` shifts the cells so that a mesh line lies at x = 0.3 mm: where baths or materials bend within a
+    cell, no order helps.
+    """
+    (width, height), (nx, ny) = _checked_sizes("rectangle", (width, height), (nx, ny))
+    checks.flag("rectangle: triangles", triangles)
+    xs, ys = _graded("rectangle", (width, height), (nx, ny), (("left", "right"), ("bottom", "top")), grade)
+    for axis, place in _by_name("rectangle: lines", lines, {"x": 0.3}):
+        checks.one_of("rectangle: lines: axis", axis, ("x", "y"))
+        nodes = xs if axis == "x" else ys
+        if not (checks.is_number(place) and 0 < place < nodes[-1] and len(nodes) >= 3):
+            raise InputError(
+                f"rectangle: lines = {{{axis!r}: {checks.shown(place)}}} mm needs two cells or more in {axis} and a place "
+                f"between 0 and {nodes[-1]:g}"
+            )
+        nodes[:] = _shifted(nodes, place)
+    return MakeStructured2DMesh(
+        quads=not triangles, nx=nx, ny=ny, mapping=lambda s, t: (xs[round(nx * s)], ys[round(ny * t)])
+    )
+
+
+def box(
+    width: float,
+    depth: float,
+    height: float,
+    nx: int,
+    ny: int,
+    nz: int,
+    cells: str = "hexahedra",
+    grade: Grade | None = None,
+) -> Mesh:
+    """Cells on [0, width] × [0, depth] × [0, height] [mm].
+
+    Boundaries: "left" (x = 0) and "right", "front" (y = 0) and "back", "bottom" (z = 0) and "top". `cells` are "hexahedra",
+    or two "prisms" (triangles in x and y, extruded in z) or six "tetrahedra" in each. `grade` as in `column`.
+    """
+    checks.one_of("box: cells", cells, ("hexahedra", "prisms", "tetrahedra"))
+    (width, depth, height), (nx, ny, nz) = _checked_sizes("box", (width, depth, height), (nx, ny, nz))
+    sides = (("left", "right"), ("front", "back"), ("bottom", "top"))
+    xs, ys, zs = _graded("box", (width, depth, height), (nx, ny, nz), sides, grade)
+    mesh = MakeStructured3DMesh(
+        hexes=cells == "hexahedra",
+        prism=cells == "prisms",
+        nx=nx,
+        ny=ny,
+        nz=nz,
+        mapping=lambda r, s, t: (xs[round(nx * r)], ys[round(ny * s)], zs[round(nz * t)]),
+    )
+    # NGSolve looks along x and counts the sides x = 0, y = 0, x = width, y = depth, z = 0, z = height.
+    for number, name in enumerate(("left", "front", "right", "back", "bottom", "top")):
+        mesh.ngmesh.SetBCName(number, name)
+    return mesh
+
+
+def from_occ(shape: Any, maxh: float, order: int = 1, quads: bool = False) -> Mesh:
+    """Mesh a shape of `netgen.occ` in mm: a face in the plane z = 0 with named edges, or a solid with named faces.
+
+    `maxh` is the largest cell size [mm]; the cells follow curved sides with polynomials of `order`, best the
+    displacement's. `quads` meshes a face with quadrilaterals where it can, with triangles where it cannot. Unnamed sides
+    are sealed and free.
+
+        disc = WorkPlane().Circle(2.0).Face()
+        disc.edges.name = "rim"
+        mesh = from_occ(disc, maxh=0.5, order=2)
+    """
+    maxh = checks.positive("from_occ: maxh", maxh, "mm")
+    order = checks.whole("from_occ: order of the curved sides", order, 1, 10)
+    checks.flag("from_occ: quads", quads)
+    checks.instance("from_occ: shape", shape, TopoDS_Shape, "a shape of netgen.occ, such as Rectangle(1.0, 2.0).Face()")
+    solid = len(shape.solids) > 0
+    if solid and quads:
+        raise InputError("from_occ: a solid is meshed with tetrahedra; quads is for faces")
+    if not solid and not len(shape.faces):
+        raise InputError("from_occ: the shape has neither a solid nor a face")
+    sides = "faces" if solid else "edges"
+    names = [side.name or "" for side in getattr(shape, sides)]
+    check_named("from_occ", names, f"name some of the shape's {sides}, shape.{sides}.name = 'rim'")
+    if not solid:
+        check_plane("from_occ", np.array([vertex.p[2] for vertex in shape.vertices]))
+    geometry = OCCGeometry(shape) if solid else OCCGeometry(shape, dim=2)
+    mesh = Mesh(geometry.GenerateMesh(maxh=maxh, quad_dominated=quads))
+    mesh.Curve(order)
+    check_mesh(mesh)
+    return mesh
+
+
+def check_mesh(mesh: Mesh) -> None:
+    """Refuse cells that are turned inside out or have no size, by number and place.
+
+    At the corners and the integration points of degree 4 the determinant of the cell's mapping has to have the sign it has
+    in most cells of the same shape (which one depends on how the mesh generator numbers the corners), and the thickness,
+    determinant over largest stretch to the power d − 1, has to be above round-off of the body's size. The determinant of a
+    straight quadrilateral is linear, so that its corners decide: their angles have to stay below 180°.
+    """
+    round_off = 1e-12 * float(np.ptp(mesh.ngmesh.Coordinates(), axis=0).max())
+    for name, shape in _CELLS[mesh.dim].items():
+        where = mesh.MapToAllElements({shape: with_corners(shape, 4)}, VOL)
+        if not len(where):
+            continue
+        mapping = specialcf.JacobianMatrix(mesh.dim)(where).reshape(-1, mesh.dim, mesh.dim)
+        det = np.linalg.det(mapping)
+        stretch = np.linalg.norm(mapping, axis=1).max(axis=1)
+        thickness = np.sign(np.median(det)) * det / np.maximum(stretch, round_off) ** (mesh.dim - 1)
+        bad = np.unique(where["nr"][~(thickness > round_off)])
+        if len(bad):
+            found = thickness[where["nr"] == bad[0]]
+            fault = "is turned inside out" if found.min() < -round_off else "has no size"
+            if (found[: len(IntegrationRule(shape, 4))] > round_off).all():
+                fault = "has a corner of 180° or more"
+            vertices = [mesh[vertex].point for vertex in mesh[ElementId(VOL, int(bad[0]))].vertices]
+            place = ", ".join(f"{x:.4g}" for x in np.mean(vertices, axis=0))
+            raise InputError(
+                f"mesh: cell {bad[0]}, a {name} near ({place}) mm, {fault}"
+                f"{f', as {len(bad) - 1} more' if len(bad) > 1 else ''}: move its corners, or mesh the body again"
+            )
+
+
+def check_named(what: str, names: Iterable[str], remedy: str) -> None:
+    """Refuse a mesh none of whose boundaries has a name: supports and baths could not find them."""
+    if not set(names) - {"", "default"}:
+        raise InputError(f"{what}: no boundary has a name; {remedy}")
+
+
+def check_plane(what: str, heights: NDArray) -> None:
+    """Refuse a 2-d body outside the plane z = 0; `heights` are the z of its corners [mm]."""
+    highest = heights[np.abs(heights).argmax()]
+    if abs(highest) > 1e-9:
+        raise InputError(f"{what}: a 2-d body lies in the plane z = 0, this one reaches z = {highest:g} mm")
+
+
+def _checked_sizes(what: str, sizes: tuple[float, ...], cells: tuple[int, ...]) -> tuple[list[float], list[int]]:
+    """Sizes [mm] as floats and numbers of cells as ints, neither beyond what a body can mean or a memory can hold."""
+    lengths = [checks.number(f"{what}: size", size, "mm", *SIZES) for size in sizes]
+    numbers = [checks.whole(f"{what}: number of cells", number, 1, MOST_CELLS) for number in cells]
+    if prod(numbers) > MOST_CELLS:
+        raise InputError(f"{what}: {' × '.join(map(str, numbers))} cells are more than {MOST_CELLS}; take fewer")
+    return lengths, numbers
+
+
+def _by_name(what: str, values: Any, example: dict[str, float]) -> list[tuple[Any, Any]]:
+    """The entries of a dictionary, none for None."""
+    if values is None:
+        return []
+    if not isinstance(values, dict):
+        raise InputError(f"{what} has to be a dictionary, such as {example}, got {checks.shown(values)}")
+    return list(values.items())
+
+
+def _graded(
+    what: str, sizes: tuple[float, ...], cells: tuple[int, ...], sides: tuple[tuple[str, str], ...], grade: Grade | None
+) -> list[list[float]]:
+    """Node coordinates [mm] along each axis, whose two ends are named in `sides`."""
+    names = [name for pair in sides for name in pair]
+    ratios = dict.fromkeys(names, 1.0)
+    for name, ratio in _by_name(f"{what}: grade", grade, {names[-1]: 10.0}):
+        checks.one_of(f"{what}: grade: boundary", name, names)
+        ratios[name] = checks.number(
+            f"{what}: grade at {name!r}", ratio, low=1.0, high=1e6, hint="it is largest over smallest cell"
+        )
+    return [
+        _nodes(size, number, ratios[low], ratios[high])
+        for size, number, (low, high) in zip(sizes, cells, sides, strict=True)
+    ]
+
+
+def _shifted(nodes: list[float], place: float) -> list[float]:
+    """Nodes with the one nearest to `place` moved there, stretched evenly on either side of it."""
+    number = 1 + int(np.argmin(np.abs(np.array(nodes[1:-1]) - place)))
+    return np.interp(nodes, [0.0, nodes[number], nodes[-1]], [0.0, place, nodes[-1]]).tolist()
+
+
+def _nodes(length: float, cells: int, low: float, high: float) -> list[float]:
+    """Nodes of `cells` cells on [0, length], thinned `low` and `high` times at the ends, in geometric progressions."""
+    index = np.arange(cells)
+    both = low > 1 and high > 1
+    reach = max(1, (cells - 1) // 2 if both else cells - 1)  # cells from an end to the largest
+    thinning = log(low) * np.maximum(0, 1 - index / reach) + log(high) * np.maximum(0, 1 - (cells - 1 - index) / reach)
+    nodes = np.concatenate([[0.0], np.cumsum(np.exp(-thinning))])
+    return [*(length * nodes[:-1] / nodes[-1]), length]

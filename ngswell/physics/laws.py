@@ -1,0 +1,136 @@
+"""Constitutive laws: functions of the state, one equation each. All take NGSolve fields (trial functions or results).
+
+F is the deformation gradient, J its determinant, nF the porosity, c the cation concentration and cfc the fixed charge per
+fluid volume. Fluxes are linear in the gradients they are given, so they come out in the frame the gradients are in.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from ngsolve import CoefficientFunction, Det, Id, InnerProduct, log
+
+from ngswell.physics import donnan
+from ngswell.physics.material import Field, Material
+
+
+def solidity(J: CoefficientFunction, material: Material) -> CoefficientFunction:
+    """nS = nS0 / J, eq. (13)₁ [-]."""
+    return material.nS0 / J
+
+
+def fluid_content(J: CoefficientFunction, material: Material) -> CoefficientFunction:
+    """Fluid volume per reference volume J nF = J − nS0 [-]; zero at the compression point."""
+    return J - material.nS0
+
+
+def fixed_charge(J: CoefficientFunction, material: Material, charge: Field = 1.0) -> CoefficientFunction:
+    """cfc = (1 − nS0) cfc0 / (J − nS0), eq. (13)₂ [mol/l]; `charge` scales cfc0."""
+    return charge * (1 - material.nS0) * material.cfc0 / fluid_content(J, material)
+
+
+def solid_energy(F: CoefficientFunction, material: Material) -> CoefficientFunction:
+    """Energy of the extra stress (18) per reference volume [N/mm²].
+
+    ψ = µ/2 tr C − µ ln J + λ (1 − nS0)² [J/(1 − nS0) − ln(J − nS0)]: neo-Hookean, with a pole at the compression point
+    J = nS0. In plane strain and in confined motion the omitted directions add a constant.
+    """
+    J, m = Det(F), material
+    volumetric = m.lam * (1 - m.nS0) ** 2 * (J / (1 - m.nS0) - log(J - m.nS0))
+    return m.mu / 2 * InnerProduct(F, F) - m.mu * log(J) + volumetric
+
+
+def extra_stress(F: CoefficientFunction, material: Material) -> CoefficientFunction:
+    """Kirchhoff extra stress τ = µ (B − I) + λ (1 − nS0)² [J/(1 − nS0) − J/(J − nS0)] I, eq. (18) [N/mm²]."""
+    J, m, one = Det(F), material, Id(F.dims[0])
+    return m.mu * (F * F.trans - one) + m.lam * (1 - m.nS0) ** 2 * (J / (1 - m.nS0) - J / (J - m.nS0)) * one
+
+
+def permeability(J: CoefficientFunction, material: Material) -> Field:
+    """K(J) by the material's law [mm⁴/(N s)]."""
+    return material.permeability(material.K, J, material.nS0)
+
+
+def diffusivities(nF: CoefficientFunction, material: Material) -> tuple[Field, Field]:
+    """D₊ and D₋ by the material's law [mm²/s]."""
+    return material.diffusivity(material.D_plus, nF), material.diffusivity(material.D_minus, nF)
+
+
+class Transport(NamedTuple):
+    """Fluxes relative to the solid: nF wF [mm/s], nF c₊ w₊ and nF c₋ w₋ [mol/l mm/s]."""
+
+    fluid: CoefficientFunction
+    cations: CoefficientFunction
+    anions: CoefficientFunction
+
+
+def transport_by_potentials(
+    material: Material,
+    nF: CoefficientFunction,
+    bath: CoefficientFunction,
+    cfc: CoefficientFunction,
+    drive: CoefficientFunction,
+    grad_bath: CoefficientFunction,
+) -> Transport:
+    """The same fluxes, (19) to (22), from the gradients of the virtual bath (P, c̃) in equilibrium with the point.
+
+    `bath` is c̃, `drive` is grad P (less the fluid's weight). With the electrochemical potentials over Rθ, grad µ₊ + grad µ₋
+    = 2 grad ln c̃, and zero current for grad µ₊,
+
+        nF wF     = −K [grad P − 2 φ̄ Rθ grad c̃ + Rθ (cfc grad µ₊ + 2 c₋ grad ln c̃)]
+        nF c₊ w₊  = −nF D₊ c₊ grad µ₊ + c₊ nF wF
+        grad µ₊   = {2 (D₋ − D_L) c₋ grad ln c̃ − D_L/Rθ [grad P − 2 φ̄ Rθ grad c̃]} / Θ.
+
+    c₋ grad ln c̃ = (Γ²c̃/c₊) grad c̃ has no pole at c̃ = 0. Θ, D_L as in `transport`.
+    """
+    m, RT = material, material.RT
+    K = permeability(m.nS0 / (1 - nF), m)
+    D_plus, D_minus = diffusivities(nF, m)
+    plus, minus = donnan.cations(bath, cfc, m.Gamma), donnan.anions(bath, cfc, m.Gamma)
+    D_L = cfc * K * RT / nF
+    conductance = D_plus * plus + D_minus * minus + D_L * cfc
+    of_fluid = drive - 2 * m.phi_bath * RT * grad_bath
+    of_anions = (m.Gamma**2 * bath / plus) * grad_bath  # c₋ grad ln c̃
+    of_cations = (2 * (D_minus - D_L) * of_anions - D_L / RT * of_fluid) / conductance  # grad µ₊
+    fluid = -K * (of_fluid + RT * (cfc * of_cations + 2 * of_anions))
+    cations = -nF * D_plus * plus * of_cations + plus * fluid
+    anions = -nF * D_minus * (2 * of_anions - minus * of_cations) + minus * fluid
+    return Transport(fluid, cations, anions)
+
+
+def transport(
+    material: Material,
+    nF: CoefficientFunction,
+    c: CoefficientFunction,
+    cfc: CoefficientFunction,
+    drive: CoefficientFunction,
+    grad_c: CoefficientFunction,
+    grad_cfc: CoefficientFunction,
+) -> Transport:
+    """Extended Darcy and Fick laws with the electric potential eliminated by zero current, eqs. (19) to (22).
+
+    `drive` is grad p (less the fluid's weight where a scene has one). With electrochemical potentials µ± over Rθ, grad µ± =
+    grad ln c± ± grad E/Rθ (activity coefficients constant in the gel), and the osmotic coefficient φ,
+
+        nF wF     = −K [drive − φ Rθ grad (c₊ + c₋) + Rθ (c₊ grad µ₊ + c₋ grad µ₋)] = −K (drive' + cfc grad E)
+        drive'    = drive + (1 − φ) Rθ grad (c₊ + c₋)
+        nF c± w±  = −nF D± c± grad µ± + c± nF wF = −nF D± (grad c± ± c± grad E / Rθ) + c± nF wF
+        grad E    = −Rθ/Θ [D_L/Rθ drive' − (D₋ − D₊) grad c + D₋ grad cfc],
+        Θ = D₊ c + D₋ (c − cfc) + D_L cfc,   D_L = cfc K Rθ / nF
+
+    With φ = 1, the paper's, the overall pressure drives: with the factor printed in (19) a gel in Donnan equilibrium with
+    non-uniform charge would not come to rest. (20) is taken with the porosity that D_L in (22) needs; ion saturations
+    are zero. K and D± are those of the material's laws.
+    """
+    RT = material.RT
+    K = permeability(material.nS0 / (1 - nF), material)
+    D_plus, D_minus = diffusivities(nF, material)
+    if material.phi != 1:
+        drive = drive + (1 - material.phi) * RT * (2 * grad_c - grad_cfc)
+    D_L = cfc * K * RT / nF
+    conductance = D_plus * c + D_minus * (c - cfc) + D_L * cfc
+    field = -1 / conductance * (D_L / RT * drive - (D_minus - D_plus) * grad_c + D_minus * grad_cfc)  # grad E / Rθ
+    fluid = -K * (drive + RT * cfc * field)
+    plus = -nF * D_plus * (grad_c + c * field) + c * fluid
+    minus = -nF * D_minus * (grad_c - grad_cfc - (c - cfc) * field) + (c - cfc) * fluid
+    return Transport(fluid, plus, minus)

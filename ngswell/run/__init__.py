@@ -1,0 +1,1 @@
+"""The loop over accepted steps, the state of rest, checkpoints and signals."""

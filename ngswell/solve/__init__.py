@@ -1,0 +1,1 @@
+"""One nonlinear solve and the linear solvers beneath it."""

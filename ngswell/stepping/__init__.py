@@ -1,0 +1,1 @@
+"""Time integration: schemes, step controls, and the steps from kink to kink."""
