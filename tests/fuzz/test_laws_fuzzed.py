@@ -8,7 +8,6 @@ from math import exp
 
 import numpy as np
 import pytest
-from fuzzing import SCALE, attempt, fuzzed, generated, log_uniform
 from hypothesis import example
 from hypothesis import strategies as st
 from ngsolve import CF, Det
@@ -17,6 +16,7 @@ from ngswell import HolmesMow, MackieMeares, Material, PowerLaw, rectangle
 from ngswell.closed_forms.homogeneous import FREE_DIRECTIONS, homogeneous_equilibrium
 from ngswell.physics import donnan, laws
 from ngswell.physics.material import GAS_CONSTANT
+from tests.fuzz.fuzzing import SCALE, attempt, fuzzed, generated, log_uniform
 
 EPS = np.finfo(float).eps
 RT = GAS_CONSTANT * 298.0

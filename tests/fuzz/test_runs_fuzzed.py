@@ -16,7 +16,6 @@ from random import Random
 
 import numpy as np
 import pytest
-from fuzzing import FRESH, SCALE
 from ngsolve import CF, Integrate, SetNumThreads, ngsglobals
 
 from ngswell import (
@@ -59,6 +58,7 @@ from ngswell.observers.base import Observer
 from ngswell.physics.material import Constant
 from ngswell.stepping.schemes import Scheme
 from studies.hard import unusable
+from tests.fuzz.fuzzing import FRESH, SCALE
 
 MOST_STEPS = 8
 """Accepted steps after which the watch ends a run."""

@@ -7,7 +7,6 @@ from math import inf, isfinite, nan
 
 import numpy as np
 import pytest
-from fuzzing import JUNK, NUMBERS, SCALE, attempt, built, fault, fuzzed, generated, log_uniform, named
 from hypothesis import example
 from hypothesis import strategies as st
 from ngsolve import CF, Mesh, x
@@ -62,6 +61,7 @@ from ngswell import (
 from ngswell.closed_forms.homogeneous import homogeneous_equilibrium
 from ngswell.observers.base import Observer
 from ngswell.physics.material import _RANGES, Constant
+from tests.fuzz.fuzzing import JUNK, NUMBERS, SCALE, attempt, built, fault, fuzzed, generated, log_uniform, named
 
 PARAMETERS = tuple(field.name for field in fields(Material) if field.name in _RANGES)
 FIELDS = PARAMETERS[:7]

@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
-from test_studies import quick
 
 from ngswell import TABLE_2
 from ngswell.closed_forms.homogeneous import homogeneous_equilibrium
 from studies.convergence import VARIANTS, as_variant, growth_rates, held_sideways, swell, undrained
 from studies.free_swelling import scene
+from tests.studies.test_studies import quick
 
 
 @pytest.fixture(scope="module")

@@ -1,9 +1,9 @@
 """The study of time and memory over size at its quick size. Seconds depend on who else computes: none is tested."""
 
 import pytest
-from test_studies import quick
 
 from studies.growth import QUICK_CELLS, STEPS, TIMES
+from tests.studies.test_studies import quick
 
 
 def unknowns(dimension, cells):

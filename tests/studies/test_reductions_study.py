@@ -1,10 +1,10 @@
 """The study of the reduced models at its quick size."""
 
 import pytest
-from test_studies import quick
 
 from ngswell import TABLE_1
 from studies.reductions import BATHS, CHARGED, CHARGES, LOADS, MODELS, RATIOS, H
+from tests.studies.test_studies import quick
 
 
 def test_reductions(tmp_path):

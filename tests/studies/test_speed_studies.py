@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from test_studies import quick
 
 from studies import speed_error
 from studies.__main__ import main
 from studies.speed_error import Course, Reference, seconds_at
+from tests.studies.test_studies import quick
 
 
 def test_seconds_at_an_error():

@@ -1,9 +1,9 @@
 """The study of all treatments at its quick size."""
 
 import pytest
-from test_studies import quick
 
 from studies.treatments import CHOICES, QUICK_DECADES, key
+from tests.studies.test_studies import quick
 
 
 def test_treatments(tmp_path):

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from conftest import confined_column
 from ngsolve import Integrate, Norm, x, y
 
 from ngswell import (
@@ -38,6 +37,7 @@ from ngswell import (
 from ngswell.analysis.stability import growth_factor
 from ngswell.closed_forms.homogeneous import homogeneous_equilibrium, lagged_column_factor
 from ngswell.physics import donnan, laws
+from tests.scenes import confined_column
 
 REAL = {"phi": 0.85, "phi_bath": 0.95, "Gamma": 1.1}
 CHOICES = [

@@ -4,7 +4,6 @@ In a bath of 1e-9 mol/l the gel holds 1e-17 of anions: c₊ is the charge to rou
 """
 
 import pytest
-from conftest import P0, confined_column
 
 from ngswell import (
     TABLE_1,
@@ -31,6 +30,7 @@ from ngswell import (
 from ngswell.closed_forms.homogeneous import homogeneous_equilibrium
 from ngswell.models import concentration
 from ngswell.problem.problem import Snapshot
+from tests.scenes import P0, confined_column
 
 CHOICES = {
     "Concentration": (Concentration(), None),

@@ -4,7 +4,6 @@ from math import cos, pi, radians, sin
 
 import numpy as np
 import pytest
-from conftest import P0
 from ngsolve import Integrate, Mesh, specialcf
 from ngsolve.meshes import MakeStructured2DMesh, MakeStructured3DMesh
 
@@ -32,6 +31,7 @@ from ngswell import (
     rectangle,
 )
 from ngswell.closed_forms.homogeneous import homogeneous_equilibrium
+from tests.scenes import P0
 
 FALLING = Ramp((0, 0.15), (10, 0.125))
 

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from conftest import P0, strip
 from ngsolve import x, y
 
 from ngswell import (
@@ -32,6 +31,7 @@ from ngswell import (
     rectangle,
 )
 from ngswell.closed_forms.homogeneous import homogeneous_equilibrium
+from tests.scenes import P0, strip
 
 
 def block(model=None, material=TABLE_2, supports=None, **changes):

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from conftest import P0, confined_column, strip
 
 from ngswell import (
     TABLE_1,
@@ -31,6 +30,7 @@ from ngswell import (
     rectangle,
 )
 from ngswell.closed_forms.homogeneous import homogeneous_equilibrium
+from tests.scenes import P0, confined_column, strip
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,6 @@ from math import inf
 
 import numpy as np
 import pytest
-from conftest import strip
 from ngsolve import CF, y
 
 from ngswell import TABLE_2, Bath, Fixed, InputError, InstabilityError, Lagged, Potential, Snapshots, Stability
@@ -13,6 +12,7 @@ from ngswell.analysis.stability import Perturbations
 from ngswell.closed_forms.homogeneous import homogeneous_equilibrium
 from studies.convergence import growth_rates, held_sideways, swell
 from studies.hard_wrinkles import CELLS, SKINNED, refinement, unresolved, wrinkles
+from tests.scenes import strip
 
 
 def at_rest(bath):

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from conftest import confined_column, strip
 from ngsolve import CF, x, y
 
 from ngswell import (
@@ -33,6 +32,7 @@ from ngswell.closed_forms.homogeneous import homogeneous_equilibrium, lagged_col
 from ngswell.physics import donnan
 from ngswell.problem.problem import Snapshot
 from studies.oscillation import disturbed, measured_growth
+from tests.scenes import confined_column, strip
 
 SOFT = replace(TABLE_1, mu=0.06)
 """Here the dead load p0 exceeds µ and the strip would buckle, faster than steps of 0.1 s and more can resolve: backward

@@ -5,7 +5,6 @@ from functools import cached_property
 
 import numpy as np
 import pytest
-from conftest import P0, confined_column
 from ngsolve import CF, cos, sin, x
 
 from ngswell import (
@@ -41,6 +40,7 @@ from ngswell.closed_forms.linear_column import (
 )
 from ngswell.physics import donnan, laws
 from ngswell.problem.problem import Snapshot
+from tests.scenes import P0, confined_column
 
 HEIGHT, BATH = 0.5, 0.15  # mm, mol/l
 CLOSED = LinearColumn(TABLE_1, BATH, HEIGHT)

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from conftest import P0, confined_column, strip
 from ngsolve import CF, y
 
 from ngswell import (
@@ -31,6 +30,7 @@ from ngswell.analysis.stability import growth_factor
 from ngswell.closed_forms.homogeneous import homogeneous_equilibrium, lagged_column_factor
 from ngswell.models.concentration import State
 from studies.oscillation import disturbed, measured_growth
+from tests.scenes import P0, confined_column, strip
 
 FALLING = Ramp((0, 0.15), (10, 0.125))
 

@@ -26,7 +26,7 @@ import sys
 import ngsolve
 ngsolve.SetNumThreads(1)  # with more threads two runs differ in the last digits, interrupted or not
 import numpy as np
-from conftest import strip
+from tests.scenes import strip
 from ngswell import *
 from ngswell.observers.base import Observer
 
@@ -56,11 +56,9 @@ def script(tmp_path_factory):
 
 
 def start(script, folder, every=0.0, ballast=0, tolerance=1e-4, **options):
-    tests = Path(__file__).parents[1]
-    paths = [str(tests), str(tests.parent)]
     return subprocess.Popen(
         [sys.executable, str(script), str(every), str(ballast), str(tolerance)],
-        cwd=folder, env={**os.environ, "PYTHONPATH": os.pathsep.join(paths)}, text=True,
+        cwd=folder, env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}, text=True,
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, **options,
     )  # fmt: skip
 

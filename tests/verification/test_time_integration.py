@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from conftest import confined_column
 
 from ngswell import (
     BACKWARD_EULER,
@@ -23,6 +22,7 @@ from ngswell import (
     Probe,
     Ramp,
 )
+from tests.scenes import confined_column
 
 FALLING = Ramp((0, 0.15), (10, 0.125))  # s, mol/l
 EXACT = Newton(tolerance=1e-13, most_iterations=40)

@@ -6,12 +6,12 @@ from itertools import product
 
 import numpy as np
 import pytest
-from conftest import confined_column
 from ngsolve import CF, x
 
 from ngswell import TABLE_2, HolmesMow, InputError, LocalDonnan, MackieMeares, Material, Penalty, PowerLaw, rectangle
 from ngswell.physics import donnan, laws
 from ngswell.physics.material import Constant
+from tests.scenes import confined_column
 
 MESH = rectangle(1, 1, 1, 1)  # a mesh point does not keep its mesh alive
 POINT = MESH(0.3, 0.4)

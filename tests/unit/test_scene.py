@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from conftest import confined_column, strip
 from ngsolve import CF, x
 
 from ngswell import (
@@ -49,6 +48,7 @@ from ngswell import (
 )
 from ngswell.analysis.stability import growth_factor
 from ngswell.closed_forms.homogeneous import homogeneous_equilibrium
+from tests.scenes import confined_column, strip
 
 GOOD = {"mu": 0.24, "lam": 0.02, "nS0": 0.25, "cfc0": 0.2, "D_plus": 5e-4, "D_minus": 8e-4, "K": 1e-3}
 

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from conftest import confined_column, strip
 from ngsolve import L2, IfPos, LinearForm, ds, x, y
 
 from ngswell import (
@@ -41,6 +40,7 @@ from ngswell import (
 )
 from ngswell.baths.weak import normal_size
 from ngswell.solve.direct import CondensedSolver, LinearSolver, best_solver, solver_of
+from tests.scenes import confined_column, strip
 
 
 def block(**changes) -> Scene:

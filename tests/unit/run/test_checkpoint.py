@@ -8,7 +8,6 @@ from pathlib import Path
 import ngsolve
 import numpy as np
 import pytest
-from conftest import confined_column, strip
 
 import ngswell
 from ngswell import (
@@ -39,6 +38,7 @@ from ngswell import (
 )
 from ngswell.observers.base import Observer
 from ngswell.solve.direct import CondensedSolver, LinearSolver, best_solver
+from tests.scenes import confined_column, strip
 
 FALLING = Ramp((0, 0.15), (10, 0.125))
 

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from conftest import confined_column, strip
 from ngsolve import CF
 
 from ngswell import (
@@ -24,6 +23,7 @@ from ngswell import (
 from ngswell.baths.sampling import BathBoundary, Slopes
 from ngswell.mesh.points import vertices
 from ngswell.physics import donnan
+from tests.scenes import confined_column, strip
 
 RULES = [InnerLayer(), Averaged(), LeastSquares()]
 

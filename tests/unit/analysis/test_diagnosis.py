@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from conftest import confined_column, strip
 from netgen.occ import Compound, Glue, MoveTo, Y
 from ngsolve import VOL, x, y
 
@@ -31,6 +30,7 @@ from ngswell import (
 )
 from ngswell.analysis.diagnosis import connected_parts, singular_mode
 from ngswell.mesh.points import points, points_and_corners
+from tests.scenes import confined_column, strip
 
 NO_CHARGE = Material(mu=0.24, lam=0.02, nS0=0.25, cfc0=0.0, D_plus=5e-4, D_minus=8e-4, K=1e-3)
 MODELS = {

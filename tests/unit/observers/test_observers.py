@@ -5,7 +5,6 @@ import xml.etree.ElementTree as ElementTree
 import meshio
 import numpy as np
 import pytest
-from conftest import confined_column, strip
 from ngsolve import x, y
 
 from ngswell import (
@@ -34,6 +33,7 @@ from ngswell import (
     Symmetry,
     rectangle,
 )
+from tests.scenes import confined_column, strip
 
 FALLING = Ramp((0, 0.15), (10, 0.125))
 

@@ -1,0 +1,1 @@
+"""A package, so that `tests.scenes` is the one beside it."""
