@@ -2,12 +2,35 @@
 
 from __future__ import annotations
 
-from ngswell import TABLE_1, Bath, Concentration, Confined, Penalty, PlaneStrain, Roller, Scene, Traction, column, rectangle
+import numpy as np
+from ngsolve import IfPos, x, y
+
+from ngswell import (
+    TABLE_1,
+    Bath,
+    Concentration,
+    Confined,
+    Material,
+    Penalty,
+    PlaneStrain,
+    Ramp,
+    Roller,
+    Scene,
+    Traction,
+    Weight,
+    column,
+    rectangle,
+)
 from ngswell.physics import donnan
 
 WEAK = Penalty(1.0)
 P0 = donnan.pressure(0.15, 0.2, TABLE_1.RT)
 """Overall pressure of Table 1 in 0.15 mol/l [N/mm²]: the load under which the reference state is at rest."""
+FALLING = Ramp((0, 0.15), (10, 0.125))  # s, mol/l
+
+NUMBERS = {"mu": 0.24, "lam": 0.02, "nS0": 0.25, "cfc0": 0.2, "D_plus": 5e-4, "D_minus": 8e-4, "K": 1e-3}
+
+UNCHARGED = Material(**{**NUMBERS, "cfc0": 0.0})
 
 
 def strip(treatment=WEAK, c=0.15, cells=(1, 30), **changes) -> Scene:
@@ -40,3 +63,44 @@ def confined_column(treatment=WEAK, c=0.15, cells=30, **changes) -> Scene:
             **changes,
         }
     )
+
+
+def block(**changes) -> Scene:
+    """A small block with everything a scene can have, out of equilibrium."""
+    layered = Material(
+        mu=0.12 + 0.05 * y, lam=0.02, nS0=IfPos(x - 0.5, 0.25, 0.2), cfc0=0.4 + 0.3 * x, D_plus=5e-4, D_minus=8e-4, K=1.07e-3
+    )
+    return Scene(
+        **{
+            "mesh": rectangle(1.0, 1.0, 2, 2),
+            "kinematics": PlaneStrain(),
+            "material": layered,
+            "model": Concentration(),
+            "supports": [Roller("bottom", "y"), Roller("left", "x")],
+            "baths": [Bath("top", c=0.5, P=0.01, treatment=Penalty(3.0)), Bath("right", c=0.5, P=0.01)],
+            "loads": [Traction("top", (0.01, -0.02)), Weight((0.0, -1e-2), (0.0, -2e-2))],
+            **changes,
+        }
+    )
+
+
+SIZES = {
+    "u": 0.02,
+    "p": 0.05,
+    "c": 0.1,
+    "cfc": 0.05,
+    "P": 0.05,
+    "salt": 0.1,
+    "efflux of fluid": 0.05,
+    "efflux of cations": 0.05,
+}
+
+
+def deformed(problem, seed=1):
+    """A state near the initial one in which every term acts."""
+    problem.initialise()
+    rng = np.random.default_rng(seed)
+    for name, part in problem.ranges.items():
+        problem.vector[part] += SIZES[name] * rng.standard_normal(part.stop - part.start)
+    held = slice(0, problem.ranges["u"].stop)
+    problem.vector[held] *= np.array(problem.free)[held]  # a cylinder's axis stays one: u_r/r would be infinite

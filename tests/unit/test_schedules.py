@@ -1,9 +1,16 @@
 """Histories over time."""
 
+import math
+
 import pytest
 from ngsolve import x
 
-from ngswell import Blend, Ramp, rectangle
+from ngswell import (
+    Blend,
+    InputError,
+    Ramp,
+    rectangle,
+)
 
 
 def test_ramp_is_linear_between_its_points_and_constant_beyond():
@@ -23,3 +30,23 @@ def test_signal_follows_the_clock():
     assert blend.kinks == (0, 10, 20)
     assert blend.at(0) == 1.0  # both agree: a number
     assert blend.at(10)(mesh(0.25, 0.5)) == pytest.approx(0.75 * 2 + 0.25 * 3)
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: Ramp(), "at least one"),
+        (lambda: Ramp((0, 1), (0, 2)), "increase"),
+        (lambda: Ramp((5, 1), (4, 2)), "4 s follows 5 s"),
+        (lambda: Ramp((0, math.inf)), "finite"),
+        (lambda: Ramp(5), "point has to be some numbers.*got 5"),
+        (lambda: Ramp((0, 1, 2)), r"takes points \(time, value\)"),
+        (lambda: Ramp(("0", "1")), "component '0'"),
+        (lambda: Ramp([(0, 1), (1, 2)]), r"component \(0, 1\)"),
+        (lambda: Blend(0.1, 0.2, x), "has to be a Ramp.*got 0.1"),
+        (lambda: Blend(Ramp((0, 0.1)), Ramp((0, 0.2)), 2.0), "weight = 2 is outside 0 … 1"),
+    ],
+)
+def test_refused(make, words):
+    with pytest.raises(InputError, match=words):
+        make()
