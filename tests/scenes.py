@@ -7,6 +7,7 @@ from ngsolve import IfPos, x, y
 
 from ngswell import (
     TABLE_1,
+    TABLE_2,
     Bath,
     Concentration,
     Confined,
@@ -16,6 +17,7 @@ from ngswell import (
     Ramp,
     Roller,
     Scene,
+    Symmetry,
     Traction,
     Weight,
     column,
@@ -29,7 +31,7 @@ P0 = donnan.pressure(0.15, 0.2, TABLE_1.RT)
 FALLING = Ramp((0, 0.15), (10, 0.125))  # s, mol/l
 
 NUMBERS = {"mu": 0.24, "lam": 0.02, "nS0": 0.25, "cfc0": 0.2, "D_plus": 5e-4, "D_minus": 8e-4, "K": 1e-3}
-
+"""What a material needs."""
 UNCHARGED = Material(**{**NUMBERS, "cfc0": 0.0})
 
 
@@ -60,6 +62,20 @@ def confined_column(treatment=WEAK, c=0.15, cells=30, **changes) -> Scene:
             "supports": [Roller("bottom", "x")],
             "baths": [Bath("top", c=c, treatment=treatment)],
             "loads": [Traction("top", (-P0,))],
+            **changes,
+        }
+    )
+
+
+def quarter(treatment=None, c=0.15, cells=4, **changes) -> Scene:
+    """A quarter of a square, 1 mm wide, with the bath on its free sides."""
+    return Scene(
+        **{
+            "mesh": rectangle(1.0, 1.0, cells, cells),
+            "kinematics": PlaneStrain(),
+            "material": TABLE_2,
+            "supports": [Symmetry("left"), Symmetry("bottom")],
+            "baths": [Bath("top|right", c=c, treatment=treatment)],
             **changes,
         }
     )

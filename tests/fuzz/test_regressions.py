@@ -12,7 +12,6 @@ from ngswell import (
     Adaptive,
     Bath,
     Concentration,
-    Confined,
     Fixed,
     InputError,
     Ledger,
@@ -20,32 +19,22 @@ from ngswell import (
     Penalty,
     Potential,
     Ramp,
-    Roller,
     Scene,
     Snapshots,
     StepError,
     Traction,
-    column,
 )
 from ngswell.physics import donnan
 from ngswell.solve.direct import LinearSolver
 from ngswell.solve.newton import Outcome
+from tests.scenes import confined_column
 
 SOFT = replace(TABLE_1, lam=0.0, cfc0=0.0)
 """Nothing keeps it from the compression point."""
 
 
 def scene(**changes) -> Scene:
-    return Scene(
-        **{
-            "mesh": column(0.5, 3),
-            "kinematics": Confined(),
-            "material": TABLE_1,
-            "supports": [Roller("bottom", "x")],
-            "baths": [Bath("top", c=0.15)],
-            **changes,
-        }
-    )
+    return confined_column(None, cells=3, **{"model": Potential(), "loads": [], **changes})
 
 
 class Balks(Newton):
@@ -150,15 +139,7 @@ def test_steps_lost_in_the_round_off_of_the_time_are_refused(steps):
 
 def test_a_crushed_body_stops_at_late_times_too():
     # Rejected steps shrank below the round-off of the time: ZeroDivisionError. Without charge and λ nothing bears the load.
-    soft = Scene(
-        mesh=column(0.5, 3),
-        kinematics=Confined(),
-        material=replace(TABLE_1, cfc0=0.0, lam=0.0),
-        supports=[Roller("bottom", "x")],
-        baths=[Bath("top", c=0.15)],
-        loads=[Traction("top", (-1000.0,))],
-        start=1e9,
-    )
+    soft = scene(material=replace(TABLE_1, cfc0=0.0, lam=0.0), loads=[Traction("top", (-1000.0,))], start=1e9)
     with pytest.raises(StepError) as stopped:
         soft.run(1e9 + 10, Fixed(1.0))
     assert stopped.value.time == soft.problem.time == 1e9

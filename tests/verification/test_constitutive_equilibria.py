@@ -37,7 +37,7 @@ from ngswell import (
 from ngswell.analysis.stability import growth_factor
 from ngswell.closed_forms.homogeneous import homogeneous_equilibrium, lagged_column_factor
 from ngswell.physics import donnan, laws
-from tests.scenes import confined_column
+from tests.scenes import confined_column, quarter
 
 REAL = {"phi": 0.85, "phi_bath": 0.95, "Gamma": 1.1}
 CHOICES = [
@@ -91,16 +91,7 @@ def at_rest(n, choice, model):
     material = Material(
         mu=0.12 * (1 + y), lam=0.02, nS0=0.2 + 0.1 * x, cfc0=0.3 + 0.3 * x * y, D_plus=5e-4, D_minus=8e-4, K=1e-3, **choice
     )
-    scene = Scene(
-        mesh=rectangle(1.0, 1.0, n, n),
-        kinematics=PlaneStrain(),
-        material=material,
-        model=model,
-        supports=[Symmetry("left"), Symmetry("bottom")],
-        baths=[Bath("top|right", c=1.0)],
-        charge=Ramp((0, 0.0), (100, 1.0)),
-        initial=(1.0, 0.0),
-    )
+    scene = quarter(c=1.0, cells=n, material=material, model=model, charge=Ramp((0, 0.0), (100, 1.0)), initial=(1.0, 0.0))
     scene.run(1e7, Adaptive(5e-2), newton=Newton())
     return scene
 

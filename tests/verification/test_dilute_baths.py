@@ -10,7 +10,6 @@ from ngswell import (
     TABLE_2,
     Adaptive,
     Area,
-    Bath,
     Concentration,
     Essential,
     Ledger,
@@ -18,19 +17,15 @@ from ngswell import (
     Newton,
     Nitsche,
     Penalty,
-    PlaneStrain,
     Potential,
     Probe,
     Ramp,
-    Scene,
     StepError,
-    Symmetry,
-    rectangle,
 )
 from ngswell.closed_forms.homogeneous import homogeneous_equilibrium
 from ngswell.models import concentration
 from ngswell.problem.problem import Snapshot
-from tests.scenes import P0, confined_column
+from tests.scenes import P0, confined_column, quarter
 
 CHOICES = {
     "Concentration": (Concentration(), None),
@@ -61,15 +56,7 @@ def test_column(choice, end, until_diluted):
 
 def block(model, treatment, c):
     """A quarter of a square of Table 2, which starts swollen in 1 mol/l."""
-    return Scene(
-        mesh=rectangle(1.0, 1.0, 4, 4),
-        kinematics=PlaneStrain(),
-        material=TABLE_2,
-        model=model,
-        supports=[Symmetry("left"), Symmetry("bottom")],
-        baths=[Bath("top|right", c=c, treatment=treatment)],
-        initial=(1.0, 0.0),
-    )
+    return quarter(treatment, c, model=model, initial=(1.0, 0.0))
 
 
 def diluted_area(choice, end, duration, until):

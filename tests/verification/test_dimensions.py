@@ -31,9 +31,7 @@ from ngswell import (
     rectangle,
 )
 from ngswell.closed_forms.homogeneous import homogeneous_equilibrium
-from tests.scenes import P0
-
-FALLING = Ramp((0, 0.15), (10, 0.125))
+from tests.scenes import FALLING, P0
 
 
 def bar(n: int) -> Mesh:

@@ -20,33 +20,22 @@ from ngswell import (
     Material,
     Newton,
     Penalty,
-    PlaneStrain,
     Potential,
     Ramp,
     Roller,
-    Scene,
     StepError,
     Symmetry,
     Traction,
     rectangle,
 )
 from ngswell.closed_forms.homogeneous import homogeneous_equilibrium
-from tests.scenes import P0, strip
+from tests.scenes import P0, quarter, strip
 
 
 def block(model=None, material=TABLE_2, supports=None, **changes):
-    return Scene(
-        **{
-            "mesh": rectangle(1.0, 1.0, 4, 4),
-            "kinematics": PlaneStrain(),
-            "material": material,
-            "supports": supports or [Symmetry("left"), Symmetry("bottom")],
-            "baths": [Bath("top|right", c=Ramp((500, 4.1), (600, 0.3)))],
-            "charge": Ramp((0, 0.0), (400, 1.0)),
-            **({} if model is None else {"model": model}),
-            **changes,
-        }
-    )
+    given = {name: value for name, value in (("model", model), ("supports", supports)) if value}
+    bath = Ramp((500, 4.1), (600, 0.3))
+    return quarter(c=bath, material=material, **{"charge": Ramp((0, 0.0), (400, 1.0)), **given, **changes})
 
 
 @pytest.mark.parametrize("model", [None, LocalDonnan(), Potential()])

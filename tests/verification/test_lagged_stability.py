@@ -9,7 +9,6 @@ from ngsolve import CF, x, y
 from ngswell import (
     TABLE_1,
     Averaged,
-    Bath,
     Concentration,
     Fixed,
     Frozen,
@@ -19,20 +18,16 @@ from ngswell import (
     Newton,
     NgswellError,
     Penalty,
-    PlaneStrain,
     Probe,
     Ramp,
-    Scene,
-    Symmetry,
     Traction,
-    rectangle,
 )
 from ngswell.analysis.stability import growth_factor, leading_eigenvalues
 from ngswell.closed_forms.homogeneous import homogeneous_equilibrium, lagged_column_factor
 from ngswell.physics import donnan
 from ngswell.problem.problem import Snapshot
 from studies.oscillation import disturbed, measured_growth
-from tests.scenes import confined_column, strip
+from tests.scenes import confined_column, quarter, strip
 
 SOFT = replace(TABLE_1, mu=0.06)
 """Here the dead load p0 exceeds µ and the strip would buckle, faster than steps of 0.1 s and more can resolve: backward
@@ -53,14 +48,7 @@ def loaded(treatment, material=TABLE_1, build=strip, **changes):
 
 def block(treatment, material=TABLE_1, cells=4):
     """A quarter of a block, the bath on its two free sides."""
-    return Scene(
-        mesh=rectangle(1.0, 1.0, cells, cells),
-        kinematics=PlaneStrain(),
-        material=material,
-        model=Concentration(),
-        supports=[Symmetry("left"), Symmetry("bottom")],
-        baths=[Bath("top|right", c=0.15, treatment=treatment)],
-    )
+    return quarter(treatment, cells=cells, material=material, model=Concentration())
 
 
 def swollen(scene):

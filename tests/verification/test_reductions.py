@@ -37,6 +37,7 @@ from ngswell.closed_forms.homogeneous import homogeneous_equilibrium
 from ngswell.models.local_donnan import State
 from ngswell.physics import donnan, laws
 from studies.reductions import effective
+from tests.scenes import confined_column
 
 WEAK = Penalty(relative=1e4)
 UNCHARGED = replace(TABLE_1, cfc0=0.0)
@@ -79,15 +80,9 @@ def test_uncharged_is_the_full_model_without_charge(motion, order, full):
 
 def disturbed_column(model, material, load=0.0, c=0.15, P=0.0, cells=20):
     """A column of Table 1 in equilibrium, disturbed by a load or by its bath's concentration or pressure."""
-    return Scene(
-        mesh=column(0.5, cells),
-        kinematics=Confined(),
-        material=material,
-        model=model,
-        supports=[Roller("bottom", "x")],
-        baths=[Bath("top", c=c, P=P, treatment=WEAK)],
-        loads=[Traction("top", (-donnan.pressure(0.15, material.cfc0, material.RT) - load,))],
-    )
+    baths = [Bath("top", c=c, P=P, treatment=WEAK)]
+    loads = [Traction("top", (-donnan.pressure(0.15, material.cfc0, material.RT) - load,))]
+    return confined_column(cells=cells, material=material, model=model, baths=baths, loads=loads)
 
 
 def top(scene, newton=None):

@@ -11,28 +11,24 @@ from ngswell import (
     Adaptive,
     Bath,
     Concentration,
-    Confined,
     Fixed,
     Lagged,
     Material,
     Penalty,
     PlaneStrain,
+    Potential,
     Probe,
-    Ramp,
     Roller,
     Scene,
     StepError,
     Traction,
-    column,
     rectangle,
 )
 from ngswell.analysis.stability import growth_factor
 from ngswell.closed_forms.homogeneous import homogeneous_equilibrium, lagged_column_factor
 from ngswell.models.concentration import State
 from studies.oscillation import disturbed, measured_growth
-from tests.scenes import P0, confined_column, strip
-
-FALLING = Ramp((0, 0.15), (10, 0.125))
+from tests.scenes import FALLING, P0, confined_column, strip
 
 
 @pytest.mark.parametrize("dt", [0.1, 10.0])
@@ -174,10 +170,7 @@ def test_confined_and_field_parameters():
     ends = []
     for material in (TABLE_1, fields):
         probe = Probe((0.5,), "displacement")
-        scene = Scene(
-            mesh=column(0.5, 10), kinematics=Confined(), material=material, supports=[Roller("bottom", "x")],
-            baths=[Bath("top", c=FALLING, treatment=Penalty(1.0))], loads=[Traction("top", (-P0,))],
-        )  # fmt: skip
+        scene = confined_column(c=FALLING, cells=10, material=material, model=Potential())
         scene.run(20.0, Fixed(5.0), [probe])
         ends.append(probe.values["displacement"])
     assert ends[0] == pytest.approx(ends[1], abs=1e-15)

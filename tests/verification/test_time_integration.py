@@ -20,11 +20,9 @@ from ngswell import (
     Penalty,
     Potential,
     Probe,
-    Ramp,
 )
-from tests.scenes import confined_column
+from tests.scenes import FALLING, confined_column
 
-FALLING = Ramp((0, 0.15), (10, 0.125))  # s, mol/l
 EXACT = Newton(tolerance=1e-13, most_iterations=40)
 
 MODELS = {

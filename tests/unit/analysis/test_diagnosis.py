@@ -14,7 +14,6 @@ from ngswell import (
     Concentration,
     Fixed,
     InputError,
-    Material,
     PlaneStrain,
     Potential,
     Roller,
@@ -30,11 +29,10 @@ from ngswell import (
 )
 from ngswell.analysis.diagnosis import connected_parts, singular_mode
 from ngswell.mesh.points import points, points_and_corners
-from tests.scenes import confined_column, strip
+from tests.scenes import UNCHARGED, confined_column, strip
 
-NO_CHARGE = Material(mu=0.24, lam=0.02, nS0=0.25, cfc0=0.0, D_plus=5e-4, D_minus=8e-4, K=1e-3)
 MODELS = {
-    "Uncharged": (Uncharged(), NO_CHARGE, None),
+    "Uncharged": (Uncharged(), UNCHARGED, None),
     "Potential": (Potential(), TABLE_1, 0.15),
     "Concentration": (Concentration(), TABLE_1, 0.15),
 }

@@ -13,9 +13,6 @@ from ngswell import (
     InputError,
     Lagged,
     LeastSquares,
-    PlaneStrain,
-    Scene,
-    Symmetry,
     box,
     column,
     rectangle,
@@ -23,7 +20,7 @@ from ngswell import (
 from ngswell.baths.sampling import BathBoundary, Slopes
 from ngswell.mesh.points import vertices
 from ngswell.physics import donnan
-from tests.scenes import confined_column, strip
+from tests.scenes import confined_column, quarter, strip
 
 RULES = [InnerLayer(), Averaged(), LeastSquares()]
 
@@ -168,14 +165,8 @@ def test_one_dimension_has_one_vertex():
 @pytest.mark.parametrize("order", [2, 3, 4])
 def test_a_step_prescribes_what_the_rule_gives(order):
     """p and c at the bath of a step with varying charge, also between vertices: InnerLayer looks 0.25 mm below."""
-    scene = Scene(
-        mesh=rectangle(1.0, 1.0, 4, 4),
-        kinematics=PlaneStrain(),
-        material=TABLE_1,
-        model=Concentration(order=order),
-        supports=[Symmetry("left"), Symmetry("bottom")],
-        baths=[Bath("top", c=0.15, treatment=Lagged(InnerLayer()))],
-    )
+    baths = [Bath("top", c=0.15, treatment=Lagged(InnerLayer()))]
+    scene = quarter(material=TABLE_1, model=Concentration(order=order), baths=baths)
     problem = scene.problem
     problem.initialise()
     heights = vertices(problem.mesh)[:, 1]

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from ngswell import (
-    TABLE_2,
     Bath,
     Concentration,
     Essential,
@@ -15,14 +14,10 @@ from ngswell import (
     Multiplier,
     Nitsche,
     Penalty,
-    PlaneStrain,
     Potential,
     Ramp,
-    Scene,
-    Symmetry,
-    rectangle,
 )
-from tests.scenes import FALLING, confined_column, strip
+from tests.scenes import FALLING, confined_column, quarter, strip
 
 
 @pytest.mark.parametrize("treatment", [Penalty(1.0), Penalty(relative=1e3), Frozen(), Lagged()])
@@ -73,15 +68,8 @@ PAIRS = [
 @pytest.mark.parametrize(("model", "first", "second"), PAIRS)
 def test_ledger_with_two_baths_that_share_a_corner(model, first, second):
     ledger = Ledger()
-    scene = Scene(
-        mesh=rectangle(1.0, 1.0, 3, 3),
-        kinematics=PlaneStrain(),
-        material=TABLE_2,
-        model=model,
-        supports=[Symmetry("left"), Symmetry("bottom")],
-        baths=[Bath("top", c=Ramp((0, 1.0), (100, 0.9)), treatment=first), Bath("right", c=1.0, treatment=second)],
-        charge=Ramp((0, 0.0), (100, 0.5)),
-    )
+    baths = [Bath("top", c=Ramp((0, 1.0), (100, 0.9)), treatment=first), Bath("right", c=1.0, treatment=second)]
+    scene = quarter(cells=3, model=model, baths=baths, charge=Ramp((0, 0.0), (100, 0.5)))
     scene.run(100.0, Fixed(25.0), [ledger])
     assert max(ledger.imbalance().values()) < 1e-10  # relative to what is held; Newton's remainder
     assert min(abs(ledger.fluid_left[side][-1]) for side in ("top", "right")) > 1e-4

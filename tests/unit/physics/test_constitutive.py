@@ -11,7 +11,7 @@ from ngsolve import CF, x
 from ngswell import TABLE_2, HolmesMow, InputError, LocalDonnan, MackieMeares, Material, Penalty, PowerLaw, rectangle
 from ngswell.physics import donnan, laws
 from ngswell.physics.material import Constant
-from tests.scenes import confined_column
+from tests.scenes import NUMBERS, confined_column
 
 MESH = rectangle(1, 1, 1, 1)  # a mesh point does not keep its mesh alive
 POINT = MESH(0.3, 0.4)
@@ -190,31 +190,29 @@ def test_constants_cost_nothing(model):
 
 # -- refusals ----------------------------------------------------------------------------------------------------------
 
-GOOD = {"mu": 0.24, "lam": 0.02, "nS0": 0.25, "cfc0": 0.2, "D_plus": 5e-4, "D_minus": 8e-4, "K": 1e-3}
-
 
 @pytest.mark.parametrize(
     ("make", "words"),
     [
-        (lambda: Material(**GOOD, phi=0.0), "phi = 0 .*ideal"),
-        (lambda: Material(**GOOD, phi=-0.9), "phi = -0.9"),
-        (lambda: Material(**GOOD, phi_bath=93.0), "phi_bath = 93 .*ideal"),
-        (lambda: Material(**GOOD, Gamma=0.0), "Gamma = 0 .*bath over gel"),
-        (lambda: Material(**GOOD, Gamma=math.nan), "Gamma = nan"),
-        (lambda: Material(**GOOD, phi="0.9"), "phi has to be a number"),
-        (lambda: Material(**GOOD, phi=CF(0.9)), "phi has to be one number"),
-        (lambda: Material(**GOOD, phi_bath=CF(0.9)), "phi_bath has to be one number"),
-        (lambda: Material(**GOOD, Gamma=1 + x), "Gamma has to be one number"),
+        (lambda: Material(**NUMBERS, phi=0.0), "phi = 0 .*ideal"),
+        (lambda: Material(**NUMBERS, phi=-0.9), "phi = -0.9"),
+        (lambda: Material(**NUMBERS, phi_bath=93.0), "phi_bath = 93 .*ideal"),
+        (lambda: Material(**NUMBERS, Gamma=0.0), "Gamma = 0 .*bath over gel"),
+        (lambda: Material(**NUMBERS, Gamma=math.nan), "Gamma = nan"),
+        (lambda: Material(**NUMBERS, phi="0.9"), "phi has to be a number"),
+        (lambda: Material(**NUMBERS, phi=CF(0.9)), "phi has to be one number"),
+        (lambda: Material(**NUMBERS, phi_bath=CF(0.9)), "phi_bath has to be one number"),
+        (lambda: Material(**NUMBERS, Gamma=1 + x), "Gamma has to be one number"),
         (lambda: PowerLaw(m=-1.0), "m = -1 .*compaction"),
         (lambda: PowerLaw(m=CF(2.0)), "m has to be a number"),
         (lambda: HolmesMow(alpha=-0.1, M=1.0), "alpha = -0.1"),
         (lambda: HolmesMow(alpha=2.0, M=math.inf), "M = inf"),
-        (lambda: Material(**GOOD, permeability=2.0), "permeability = 2.0 is not a law.*PowerLaw"),
-        (lambda: Material(**GOOD, permeability=PowerLaw), "permeability.*not a law.*PowerLaw"),
-        (lambda: Material(**GOOD, permeability=MackieMeares()), "permeability.*not a law"),
-        (lambda: Material(**GOOD, permeability=lambda K0, J, nS0: K0 * (J - nS0)), "gives K = 0.5 K0 at J = 1"),
-        (lambda: Material(**GOOD, diffusivity=PowerLaw(m=2.0)), "diffusivity.*not a law.*MackieMeares"),
-        (lambda: Material(**GOOD, diffusivity=MackieMeares), "diffusivity.*not a law.*MackieMeares"),
+        (lambda: Material(**NUMBERS, permeability=2.0), "permeability = 2.0 is not a law.*PowerLaw"),
+        (lambda: Material(**NUMBERS, permeability=PowerLaw), "permeability.*not a law.*PowerLaw"),
+        (lambda: Material(**NUMBERS, permeability=MackieMeares()), "permeability.*not a law"),
+        (lambda: Material(**NUMBERS, permeability=lambda K0, J, nS0: K0 * (J - nS0)), "gives K = 0.5 K0 at J = 1"),
+        (lambda: Material(**NUMBERS, diffusivity=PowerLaw(m=2.0)), "diffusivity.*not a law.*MackieMeares"),
+        (lambda: Material(**NUMBERS, diffusivity=MackieMeares), "diffusivity.*not a law.*MackieMeares"),
     ],
 )
 def test_refused(make, words):

@@ -38,9 +38,7 @@ from ngswell import (
 )
 from ngswell.observers.base import Observer
 from ngswell.solve.direct import CondensedSolver, LinearSolver, best_solver
-from tests.scenes import confined_column, strip
-
-FALLING = Ramp((0, 0.15), (10, 0.125))
+from tests.scenes import FALLING, confined_column, strip
 
 
 @pytest.fixture
