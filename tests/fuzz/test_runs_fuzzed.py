@@ -58,7 +58,7 @@ from ngswell import (
 from ngswell.observers.base import Observer
 from ngswell.physics.material import Constant
 from ngswell.stepping.schemes import Scheme
-from studies.hard import unusable
+from studies.hard_cases.attempt import unusable
 
 MOST_STEPS = 8
 """Accepted steps after which the watch ends a run."""

@@ -6,8 +6,8 @@ from test_studies import quick
 
 from ngswell import TABLE_2
 from ngswell.closed_forms.homogeneous import homogeneous_equilibrium
-from studies.convergence import VARIANTS, as_variant, growth_rates, held_sideways, swell, undrained
-from studies.free_swelling import scene
+from studies.limits.convergence import VARIANTS, as_variant, growth_rates, held_sideways, swell, undrained
+from studies.paper.free_swelling import scene
 
 
 @pytest.fixture(scope="module")

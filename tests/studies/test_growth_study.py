@@ -3,7 +3,7 @@
 import pytest
 from test_studies import quick
 
-from studies.growth import QUICK_CELLS, STEPS, TIMES
+from studies.choices.growth import QUICK_CELLS, STEPS, TIMES
 
 
 def unknowns(dimension, cells):

@@ -4,7 +4,7 @@ import pytest
 from test_studies import quick
 
 from ngswell import TABLE_1
-from studies.reductions import BATHS, CHARGED, CHARGES, LOADS, MODELS, RATIOS, H
+from studies.choices.reductions import BATHS, CHARGED, CHARGES, LOADS, MODELS, RATIOS, H
 
 
 def test_reductions(tmp_path):

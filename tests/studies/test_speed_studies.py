@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from test_studies import quick
 
-from studies import speed_error
 from studies.__main__ import main
-from studies.speed_error import Course, Reference, seconds_at
+from studies.choices import speed_error
+from studies.choices.speed_error import Course, Reference, seconds_at
 
 
 def test_seconds_at_an_error():

@@ -3,7 +3,7 @@
 import pytest
 from test_studies import quick
 
-from studies.treatments import CHOICES, QUICK_DECADES, key
+from studies.choices.treatments import CHOICES, QUICK_DECADES, key
 
 
 def test_treatments(tmp_path):

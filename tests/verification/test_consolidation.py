@@ -33,7 +33,7 @@ from ngswell import (
 from ngswell.closed_forms import consolidation
 from ngswell.models.model import Term
 from ngswell.physics import laws
-from studies.verification import quarter_disc
+from studies.limits.verification import quarter_disc
 
 SOLID = {"mu": 0.24, "lam": 0.16, "nS0": 0.25, "cfc0": 0.0, "D_plus": 5e-4, "D_minus": 8e-4}
 MATERIAL = Material(**SOLID, K=1e-3)

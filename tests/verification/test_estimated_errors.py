@@ -23,7 +23,7 @@ from ngswell import (
     rectangle,
 )
 from ngswell.analysis.recovery import Recovery
-from studies import free_swelling
+from studies.paper import free_swelling
 
 SHAPES = {
     "segments": (lambda n: column(1.0, n), Confined(), exp(2 * x) * sin(3 * x)),

@@ -1,4 +1,4 @@
-"""Hard cases of ions, of time and of contrasts at a small size, and what their bounds rest on (`studies/hard_ions.py`)."""
+"""Hard cases of ions, time and contrasts at a small size, and what their bounds rest on (`studies/hard_cases/ions.py`)."""
 
 import numpy as np
 import pytest
@@ -6,8 +6,8 @@ import pytest
 from ngswell import TABLE_1, Adaptive, Fixed, Ledger, Newton, Penalty, Probe, Ramp, StepError, column
 from ngswell.closed_forms.linear_column import LinearColumn, conductance
 from ngswell.stepping.stepper import _following
-from studies.hard import CHOICES
-from studies.hard_ions import (
+from studies.hard_cases.attempt import CHOICES
+from studies.hard_cases.ions import (
     BATH,
     CELLS,
     CHARGED,

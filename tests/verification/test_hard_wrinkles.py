@@ -11,8 +11,8 @@ from ngsolve import CF, y
 from ngswell import TABLE_2, Bath, Fixed, InputError, InstabilityError, Lagged, Potential, Snapshots, Stability
 from ngswell.analysis.stability import Perturbations
 from ngswell.closed_forms.homogeneous import homogeneous_equilibrium
-from studies.convergence import growth_rates, held_sideways, swell
-from studies.hard_wrinkles import CELLS, SKINNED, refinement, unresolved, wrinkles
+from studies.hard_cases.wrinkles import CELLS, SKINNED, refinement, unresolved, wrinkles
+from studies.limits.convergence import growth_rates, held_sideways, swell
 
 
 def at_rest(bath):

@@ -6,7 +6,7 @@ import pytest
 from ngswell import LocalDonnan, Potential
 from ngswell.closed_forms.homogeneous import homogeneous_equilibrium
 from ngswell.physics import laws
-from studies.verification import gel, homogeneous_body, printed_drive, unrest
+from studies.limits.verification import gel, homogeneous_body, printed_drive, unrest
 
 
 @pytest.mark.parametrize("motion", ["confined", "plane strain", "3-d"])

@@ -1,6 +1,6 @@
 """Observed orders of the whole nonlinear system against manufactured solutions, in space, in time and for every kinematics.
 
-`studies/manufactured.py` has the equations a second time, and the sources. Each claim has a control: with a term taken
+`studies.limits.manufactured` has the equations a second time, and the sources. Each claim has a control: with a term taken
 out of the model, or put in wrongly, the order is gone.
 """
 
@@ -12,7 +12,7 @@ from ngswell import Axisymmetric, PlaneStrain, Solid
 from ngswell.mesh.points import points
 from ngswell.physics import kinematics as motions
 from ngswell.physics import laws
-from studies.manufactured import (
+from studies.limits.manufactured import (
     BATH,
     FAST,
     KINDS,

@@ -1,6 +1,6 @@
 """Observed orders of the model `Potential`, and of baths that are met exactly, against manufactured solutions.
 
-The same cases and sources as in test_manufactured.py, from equations written a second time in studies/manufactured.py.
+The same cases and sources as in test_manufactured.py, from equations written a second time in studies.limits.manufactured.
 """
 
 import pytest
@@ -9,7 +9,7 @@ from ngswell import Concentration, Essential, Multiplier, Nitsche, Penalty, Plan
 from ngswell.baths import weak
 from ngswell.models import potential
 from ngswell.physics import laws
-from studies.manufactured import (
+from studies.limits.manufactured import (
     BATH,
     FAST,
     KINDS,

@@ -36,7 +36,7 @@ from ngswell import (
 from ngswell.closed_forms.homogeneous import homogeneous_equilibrium
 from ngswell.models.local_donnan import State
 from ngswell.physics import donnan, laws
-from studies.reductions import effective
+from studies.choices.reductions import effective
 
 WEAK = Penalty(relative=1e4)
 UNCHARGED = replace(TABLE_1, cfc0=0.0)

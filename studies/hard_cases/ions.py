@@ -49,7 +49,7 @@ from ngswell.physics import donnan
 from ngswell.problem.problem import Problem, Snapshot
 from ngswell.stepping.schemes import BACKWARD_EULER, ESDIRK4, Scheme
 from ngswell.stepping.stepper import Control
-from studies.hard import CHOICES, DEFAULTS, Attempt, attempt
+from studies.hard_cases.attempt import CHOICES, DEFAULTS, Attempt, attempt
 
 HEIGHT, BATH = 0.5, 0.15  # [mm], [mol/l]
 P0 = donnan.pressure(BATH, TABLE_1.cfc0, TABLE_1.RT)

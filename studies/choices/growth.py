@@ -48,9 +48,10 @@ from ngswell.closed_forms.homogeneous import homogeneous_equilibrium
 from ngswell.problem.problem import Problem
 from ngswell.solve.direct import LinearSolver, best_solver
 from ngswell.solve.two_level import TwoLevelSolver, gmres, units
-from studies import cylinder, free_swelling
-from studies.free_swelling import INITIAL, SIDE, WIDTH
+from studies.limits import cylinder
 from studies.output import Findings
+from studies.paper import free_swelling
+from studies.paper.free_swelling import INITIAL, SIDE, WIDTH
 
 CELLS = {2: (10, 20, 40, 80, 160, 320, 480), 3: (3, 4, 6, 8, 11, 14, 17, 24, 32)}
 """Cells along the height (2-d) or each edge (3-d)."""

@@ -79,8 +79,8 @@ from ngswell.plotting import on_deformed_body
 from ngswell.problem.problem import Problem, Snapshot
 from ngswell.solve.direct import LinearSolver
 from ngswell.solve.newton import Newton, Outcome
-from studies import free_swelling
 from studies.output import Findings
+from studies.paper import free_swelling
 
 # -- the variants --------------------------------------------------------------------------------------------------------
 

@@ -1,6 +1,6 @@
 """Hard cases: each passes with its error, or ends with an exception that says why and a usable last state.
 
-Eleven families (`studies/hard_ions.py`, `hard_mechanics.py`, `hard_wrinkles.py`), both models, and every stable treatment of
+Eleven families (`ions.py`, `mechanics.py`, `wrinkles.py`), both models, and every stable treatment of
 a bath where it makes a difference: `bath_range`, `charge`, `sudden_steps`, `contrasts`, `penalties`, `cycles`, `corner`,
 `compression`, `swelling`, `cells`, `wrinkles`. The CSV has a row an attempt; docs/hard_cases.md says what is compared and
 why each bound is what it is. An attempt is `wrong` if its error exceeds its bound, its ledger does not close, or it leaves
@@ -33,27 +33,27 @@ from matplotlib.figure import Figure
 from ngsolve import SetNumThreads
 from tqdm import tqdm
 
-from studies import hard_ions, hard_mechanics, hard_wrinkles
-from studies.hard import Attempt
-from studies.hard_wrinkles import Course
+from studies.hard_cases import ions, mechanics, wrinkles
+from studies.hard_cases.attempt import Attempt
+from studies.hard_cases.wrinkles import Course
 from studies.output import Findings
 
 FAMILIES: dict[str, Callable[[bool], list[Attempt]]] = {
     family.__name__: family
     for family in (
-        *hard_ions.FAMILIES,
-        hard_mechanics.corner,
-        hard_mechanics.compression,
-        hard_mechanics.swelling,
-        hard_mechanics.cells,
-        hard_wrinkles.wrinkles,
+        *ions.FAMILIES,
+        mechanics.corner,
+        mechanics.compression,
+        mechanics.swelling,
+        mechanics.cells,
+        wrinkles.wrinkles,
     )
 }
 SERIES: dict[str, Callable[[bool], Any]] = {
-    "alternation": hard_ions.alternation,
-    "skin": hard_ions.skin,
-    "corner_errors": hard_mechanics.corner_errors,
-    "wrinkle_series": hard_wrinkles.series,
+    "alternation": ions.alternation,
+    "skin": ions.skin,
+    "corner_errors": mechanics.corner_errors,
+    "wrinkle_series": wrinkles.series,
 }
 OUTCOMES = ("passes", "stops", "refused", "wrong")
 HEADER = (

@@ -20,6 +20,7 @@ The plain script is no part of the project: `--plain PATH` names it, or it lies 
 
 from __future__ import annotations
 
+import argparse
 import json
 import subprocess
 import sys
@@ -51,12 +52,12 @@ from ngswell import (
 )
 from ngswell.models.model import Model
 from ngswell.stepping.stepper import polynomial_at
-from studies import free_swelling
-from studies.free_swelling import END, HEIGHT, INITIAL, WIDTH
 from studies.output import Findings, cost
+from studies.paper import free_swelling
+from studies.paper.free_swelling import END, HEIGHT, INITIAL, WIDTH
 
 PICTURES = free_swelling.PICTURES[1:]
-SCRIPT = Path(__file__).resolve().parents[2] / "shared" / "peers" / "plain_ngsolve.py"
+SCRIPT = Path(__file__).resolve().parents[3] / "shared" / "peers" / "plain_ngsolve.py"
 BENDS = {"x": 0.3, "y": 0.3}
 """Where the blended baths bend [mm]."""
 
@@ -240,6 +241,18 @@ def plain_curve(script: Path, quick: bool) -> Curve:
     makers = [partial(compute_plain, script, cells, step) for cells, step in points]
     settings = [(f"{nx} x {ny}", step) for (nx, ny), step in points]
     return Curve("plain", "plain NGSolve script", "+", makers, settings)
+
+
+def options(parser: argparse.ArgumentParser) -> None:
+    """`--plain PATH`."""
+    parser.add_argument("--plain", type=existing, help="speed_error: the plain NGSolve script to compare with")
+
+
+def existing(path: str) -> Path:
+    """The path of a file; refused if there is none."""
+    if not Path(path).is_file():
+        raise argparse.ArgumentTypeError(f"there is no file {path}")
+    return Path(path)
 
 
 def run(quick: bool = False, plain: Path | None = None) -> Findings:

@@ -59,9 +59,9 @@ from ngswell.baths.bath import Treatment
 from ngswell.closed_forms.homogeneous import homogeneous_equilibrium, lagged_column_factor
 from ngswell.physics import donnan
 from ngswell.problem.problem import Problem, Snapshot
-from studies import oscillation
-from studies.oscillation import measured_growth
 from studies.output import Findings, cost
+from studies.paper import oscillation
+from studies.paper.oscillation import measured_growth
 
 BATH = 0.15  # mol/l
 STEP = 10.0  # s

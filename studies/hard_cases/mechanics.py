@@ -51,9 +51,9 @@ from ngswell.models.model import Model
 from ngswell.physics import donnan
 from ngswell.problem.problem import Snapshot
 from ngswell.schedules import Schedule
-from studies import free_swelling
-from studies.free_swelling import HEIGHT, INITIAL, SIDE, WIDTH
-from studies.hard import CHOICES, DEFAULTS, Attempt, attempt
+from studies.hard_cases.attempt import CHOICES, DEFAULTS, Attempt, attempt
+from studies.paper import free_swelling
+from studies.paper.free_swelling import HEIGHT, INITIAL, SIDE, WIDTH
 
 Choice = tuple[Model, Treatment]
 

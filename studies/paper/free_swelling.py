@@ -17,6 +17,7 @@ rest. Numbers (areas are relative to the area at 7000 s; errors are estimates of
 
 from __future__ import annotations
 
+import argparse
 from dataclasses import dataclass, replace
 from time import perf_counter
 
@@ -142,6 +143,11 @@ def course(nx: int, ny: int, tolerance: float, from_rest: bool = False) -> Cours
     observers = [area, core, corner, bottom, ledger, pictures, Progress(label)]
     result = block.run(END, Adaptive(tolerance, scheme=BACKWARD_EULER), observers, resume=begin)
     return Course(block, result, area, core, corner, bottom, ledger, pictures)
+
+
+def options(parser: argparse.ArgumentParser) -> None:
+    """`--from-rest`."""
+    parser.add_argument("--from-rest", action="store_true", help="free_swelling: skip the ramp of the charge")
 
 
 def run(quick: bool = False, from_rest: bool = False) -> Findings:

@@ -51,8 +51,8 @@ from ngswell import (
 )
 from ngswell.closed_forms.homogeneous import homogeneous_equilibrium
 from ngswell.plotting import on_deformed_body
-from studies.free_swelling import BOTTOM, END, INITIAL, SIDE
 from studies.output import Findings, cost
+from studies.paper.free_swelling import BOTTOM, END, INITIAL, SIDE
 
 RADIUS, HEIGHT = 1.1, 1.0  # mm
 AT_REST = 1e6  # s

@@ -55,7 +55,7 @@ from ngswell.models.model import Model
 from ngswell.physics import donnan, laws
 from ngswell.physics.kinematics import Kinematics
 from ngswell.setup.supports import Support
-from studies.manufactured import FAST, SLOW, errors, orders
+from studies.limits.manufactured import FAST, SLOW, errors, orders
 from studies.output import Findings, cost
 
 # -- homogeneous equilibria --------------------------------------------------------------------------------------------

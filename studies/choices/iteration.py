@@ -23,9 +23,9 @@ from threadpoolctl import threadpool_limits
 
 from ngswell import Adaptive, Concentration, Potential, Progress, Result, Scene
 from ngswell.solve.direct import solver_of
-from studies import free_swelling
-from studies.free_swelling import INITIAL
 from studies.output import Findings, cost
+from studies.paper import free_swelling
+from studies.paper.free_swelling import INITIAL
 
 UNTIL = 7220.0  # s
 PARTS = ("tangent", "residual", "bounds", "factorise", "solve")

@@ -36,9 +36,9 @@ from ngswell import (
 from ngswell.models.model import Model
 from ngswell.problem.problem import Snapshot
 from ngswell.stepping.schemes import Scheme
-from studies import boundary_charge, free_swelling
-from studies.free_swelling import END, HEIGHT, INITIAL, remodelled
 from studies.output import Findings, cost
+from studies.paper import boundary_charge, free_swelling
+from studies.paper.free_swelling import END, HEIGHT, INITIAL, remodelled
 
 MODELS = (Concentration(), Potential())
 REFERENCE = 1e-7

@@ -35,7 +35,7 @@ from ngswell.analysis.stability import Perturbations
 from ngswell.observers.base import Observer
 from ngswell.problem.problem import Problem
 from ngswell.stepping.stepper import Control
-from studies.hard import DEFAULTS, Attempt, attempt
+from studies.hard_cases.attempt import DEFAULTS, Attempt, attempt
 
 HEIGHT = 0.2  # mm, of the layer with its skin
 SKIN = 0.02  # mm

@@ -75,8 +75,8 @@ from ngswell.observers.base import Observer
 from ngswell.physics import donnan
 from ngswell.problem.problem import Problem, Snapshot
 from ngswell.stepping.stepper import StepReport
-from studies import boundary_charge, free_swelling, oscillation
 from studies.output import Findings, cost
+from studies.paper import boundary_charge, free_swelling, oscillation
 
 DECADES = (1e-2, 1e-1, 1.0, 1e1, 1e2, 1e4, 1e6, 1e9, 1e12)
 QUICK_DECADES = (1e-1, 1e4)
