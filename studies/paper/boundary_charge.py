@@ -10,84 +10,75 @@ condition follows cfc(J) at the boundary, once the charge there stays at cfc0. N
 
 from __future__ import annotations
 
-import matplotlib.pyplot as plt
+from dataclasses import dataclass
 
-from ngswell import (
-    BACKWARD_EULER,
-    TABLE_1,
-    Adaptive,
-    Bath,
-    Concentration,
-    Confined,
-    Frozen,
-    Penalty,
-    Probe,
-    Progress,
-    Ramp,
-    Roller,
-    Scene,
-    Traction,
-    column,
-)
+import matplotlib.pyplot as plt
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from ngswell import BACKWARD_EULER, TABLE_1, Adaptive, Frozen, Penalty, Probe, Progress, Result
 from ngswell.baths.bath import Treatment
 from ngswell.closed_forms.homogeneous import homogeneous_equilibrium
-from ngswell.physics import donnan
 from studies.output import Findings, cost
+from studies.scenes import COLUMN_HEIGHT, FALLING, P0, confined_column
 
-HEIGHT = 0.5  # mm
-BATH = Ramp((0, 0.15), (10, 0.125))  # s, mol/l
 AT_REST = 6000.0  # s, some thirty times the slowest relaxation time
-P0 = donnan.pressure(0.15, TABLE_1.cfc0, TABLE_1.RT)  # N/mm², holds the charged, stress-free reference state
+TREATMENTS: dict[str, Treatment] = {"following": Penalty(1.0), "frozen": Frozen()}
+BOUNDARY_CHARGES = {"following": None, "frozen": TABLE_1.cfc0}
+LABELS = {"following": "charge at the boundary follows J", "frozen": "charge at the boundary frozen at $c^{fc}_0$"}
 
 
-def scene(treatment: Treatment, cells: int) -> Scene:
-    """The column: held at the bottom, bath and equilibrium load on top."""
-    return Scene(
-        mesh=column(HEIGHT, cells),
-        kinematics=Confined(),
-        material=TABLE_1,
-        model=Concentration(),
-        supports=[Roller("bottom", "x")],
-        baths=[Bath("top", c=BATH, treatment=treatment)],
-        loads=[Traction("top", (-P0,))],
-    )
+@dataclass(frozen=True)
+class SwellingColumn:
+    """Displacement of the top [mm] over time [s], the run, and the closed form at rest [mm]."""
+
+    time: NDArray
+    top: NDArray
+    result: Result
+    closed_form: float
 
 
 def run(quick: bool = False) -> Findings:
     """Both columns, side by side."""
     cells, tolerance = (30, 1e-3) if quick else (60, 1e-4)
-    cases: dict[str, Treatment] = {"following": Penalty(1.0), "frozen": Frozen()}
-    probes, results = {}, {}
-    for name, treatment in cases.items():
-        probes[name] = Probe((HEIGHT,), "displacement")
-        progress = Progress(f"boundary_charge {name}")
-        results[name] = scene(treatment, cells).run(
-            AT_REST, Adaptive(tolerance, scheme=BACKWARD_EULER), [probes[name], progress]
-        )
+    columns = {name: compute(name, cells, tolerance) for name in TREATMENTS}
+    rows = [
+        (name, float(time), float(value.item()))
+        for name, column in columns.items()
+        for time, value in zip(column.time, column.top, strict=True)
+    ]
+    return Findings(draw(columns), ("boundary_charge", "time_s", "top_displacement_mm"), rows, numbers(columns, cells))
 
-    boundary_charges = {"following": None, "frozen": TABLE_1.cfc0}
-    numbers: dict[str, float | int | str] = {}
-    closed = {}
-    for name, charge in boundary_charges.items():
-        rest = homogeneous_equilibrium(TABLE_1, BATH.values[-1], "confined", load=P0, boundary_charge=charge)
-        closed[name] = HEIGHT * (rest.J - 1)
-        final = float(probes[name].values["displacement"][-1].item())
-        numbers |= {f"{name}_final_mm": final, f"closed_form_{name}_mm": closed[name]}
-        numbers[f"{name}_error"] = abs(final / closed[name] - 1)
-    numbers |= {"mesh": f"{cells} segments, order 2", **cost(list(results.values()))}
 
+def compute(name: str, cells: int, tolerance: float) -> SwellingColumn:
+    """One column to rest, and where it ends in closed form."""
+    probe = Probe((COLUMN_HEIGHT,), "displacement")
+    scene = confined_column(TREATMENTS[name], FALLING, cells)
+    observers = [probe, Progress(f"boundary_charge {name}")]
+    result = scene.run(AT_REST, Adaptive(tolerance, scheme=BACKWARD_EULER), observers)
+    charge = BOUNDARY_CHARGES[name]
+    rest = homogeneous_equilibrium(TABLE_1, FALLING.values[-1], "confined", load=P0, boundary_charge=charge)
+    return SwellingColumn(probe.time, probe.values["displacement"], result, COLUMN_HEIGHT * (rest.J - 1))
+
+
+def numbers(columns: dict[str, SwellingColumn], cells: int) -> dict[str, float | int | str]:
+    """Both columns at rest against their closed forms."""
+    found: dict[str, float | int | str] = {}
+    for name, column in columns.items():
+        final = float(column.top[-1].item())
+        found |= {f"{name}_final_mm": final, f"closed_form_{name}_mm": column.closed_form}
+        found[f"{name}_error"] = abs(final / column.closed_form - 1)
+    return found | {"mesh": f"{cells} segments, order 2", **cost([column.result for column in columns.values()])}
+
+
+def draw(columns: dict[str, SwellingColumn]) -> Figure:
+    """Displacement of the top over time."""
     figure, axes = plt.subplots(figsize=(5.2, 3.4))
-    labels = {"following": "charge at the boundary follows J", "frozen": "charge at the boundary frozen at $c^{fc}_0$"}
-    for (name, probe), style in zip(probes.items(), ("-", "--"), strict=True):
-        axes.plot(probe.time, probe.values["displacement"], "k" + style, label=labels[name])
-        axes.axhline(closed[name], color="0.55", lw=0.8, ls=":")
-    axes.annotate("closed forms", (1480, closed["frozen"]), (0, -4), textcoords="offset points",
+    for (name, column), style in zip(columns.items(), ("-", "--"), strict=True):
+        axes.plot(column.time, column.top, "k" + style, label=LABELS[name])
+        axes.axhline(column.closed_form, color="0.55", lw=0.8, ls=":")
+    axes.annotate("closed forms", (1480, columns["frozen"].closed_form), (0, -4), textcoords="offset points",
                   ha="right", va="top", fontsize=8, color="0.35")  # fmt: skip
     axes.set(xlabel="time [s]", ylabel="displacement of the top [mm]", xlim=(0, 1500), ylim=(0, None))
     axes.legend(loc="lower right")
-    rows = [
-        (name, float(time), float(value.item()))
-        for name, probe in probes.items()
-        for time, value in zip(probe.time, probe.values["displacement"], strict=True)
-    ]
-    return Findings(figure, ("boundary_charge", "time_s", "top_displacement_mm"), rows, numbers)
+    return figure

@@ -1,83 +1,96 @@
 """Fig. 8: a strip in equilibrium, whose bath condition takes the charge of the last step or of the present one.
 
 The 1 × 30 strip of Table 1 starts in equilibrium with a constant bath; nothing should move. A disturbance of round-off size
-(the same for both treatments) is left to itself. Numbers:
+(the same for both treatments) is left to itself, in steps of 10 s. Once the lagged strip moves by some micrometres its
+steps fail, and the control of the steps shortens them. Numbers:
 
 - `lagged_growth_per_step`: factor per step of the lagged treatment, measured where growth is clean; negative, it alternates;
 - `lagged_growth_predicted`: dominant eigenvalue of the linearised one-step map;
+- `lagged_growth_predicted_AxB`: the same on A × B cells, A across: the factor is a property of the mesh;
 - `lagged_growth_at_S_s`, `..._predicted`: the same for time steps of S seconds: a smaller step is no cure;
 - `lagged_visible_step`: first step at which node A has moved by more than 1e-6 mm;
-- `lagged_max_mm`, `weak_max_mm`: largest displacement of node A over the same number of steps;
+- `lagged_first_shortened_step_s`: time [s] from which steps are shorter than 10 s (absent if none is);
+- `lagged_rejected_steps`: rejected steps of the lagged strip;
+- `lagged_max_mm`, `weak_max_mm`: largest displacement of node A until the same time;
 - `column_factor`: the factor of a 1-d column in closed form, above −1: lagging is stable there.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from ngswell import (
-    TABLE_1,
-    Bath,
-    Concentration,
-    Fixed,
-    InputError,
-    Lagged,
-    Penalty,
-    PlaneStrain,
-    Probe,
-    Progress,
-    Result,
-    Roller,
-    Scene,
-    Traction,
-    rectangle,
-)
+from ngswell import TABLE_1, Fixed, InputError, Lagged, Penalty, Probe, Progress, Result, Scene
 from ngswell.analysis.stability import growth_factor
-from ngswell.baths.bath import Treatment
 from ngswell.closed_forms.homogeneous import lagged_column_factor
-from ngswell.physics import donnan
-from ngswell.problem.problem import Snapshot
-from studies.output import Findings, cost
+from studies.output import Findings, cost, letter_panels
+from studies.scenes import BATH, disturbed, strip
 
-BATH = 0.15  # mol/l
-P0 = donnan.pressure(BATH, TABLE_1.cfc0, TABLE_1.RT)  # N/mm²
 NODE_A = (0.0, 0.5)  # mm
 STEP = 10.0  # s
 GROWTH_STEPS = 26
-DISTURBANCE = 1e-16  # of the length of the strip
+TIME_STEPS = (0.1, 1.0, 10.0, 100.0)  # s
+MESHES = ((1, 15), (1, 30), (1, 60), (2, 30), (4, 30))
+"""Cells across and along on which the growth is predicted."""
 
 
-def scene(treatment: Treatment) -> Scene:
-    """The strip between frictionless walls, bath and equilibrium load on top."""
-    return Scene(
-        mesh=rectangle(0.02, 0.5, 1, 30),
-        kinematics=PlaneStrain(),
-        material=TABLE_1,
-        model=Concentration(),
-        supports=[Roller("bottom", "y"), Roller("left|right", "x")],
-        baths=[Bath("top", c=BATH, treatment=treatment)],
-        loads=[Traction("top", (0.0, -P0))],
-    )
+@dataclass(frozen=True)
+class March:
+    """Times [s] and vertical displacement of node A [mm] over steps of `dt` [s], and the run."""
+
+    dt: float
+    time: NDArray
+    moved: NDArray
+    result: Result
+
+    @property
+    def shortened_from(self) -> float | None:
+        """Time from which steps are shorter than `dt` [s]."""
+        short = np.flatnonzero(np.diff(self.time) < self.dt * (1 - 1e-9))
+        return float(self.time[short[0]]) if len(short) else None
 
 
-def disturbed(scene: Scene) -> Snapshot:
-    """The initial state with noise of round-off size on the displacement."""
-    problem = scene.problem
-    problem.initialise()
-    noise = np.zeros(problem.vector.size)
-    u = problem.ranges["u"]
-    noise[u] = DISTURBANCE * problem.references["u"] * np.random.default_rng(8).standard_normal(u.stop - u.start)
-    noise[~np.array(list(problem.free))] = 0.0
-    return Snapshot(scene.start, problem.vector + noise)
+@dataclass(frozen=True)
+class Strips:
+    """The lagged and the weak strip, and the lagged one in steps over three decades."""
+
+    lagged_scene: Scene
+    lagged: March
+    weak: March
+    growing: dict[float, March]
 
 
-def march(scene: Scene, steps: int, dt: float, label: str) -> tuple[NDArray, NDArray, Result]:
-    """Times [s] and vertical displacement of node A [mm] over `steps` steps, and the run."""
+def run(quick: bool = False) -> Findings:
+    """Lagged against weak, and the growth for step sizes over three decades."""
+    strips = compute(30 if quick else 60)
+    rows = [
+        (name, STEP, float(t), float(u))
+        for name, march in (("lagged", strips.lagged), ("weak", strips.weak))
+        for t, u in zip(march.time, march.moved, strict=True)
+    ]
+    rows += [("lagged", dt, k * dt, float(u)) for dt, march in strips.growing.items() for k, u in enumerate(march.moved)]
+    return Findings(draw(strips), ("treatment", "step_s", "time_s", "uy_node_A_mm"), rows, numbers(strips))
+
+
+def compute(steps: int) -> Strips:
+    """All runs; `steps` those of the two strips that are compared."""
+    scene = strip(Lagged())
+    lagged = march(scene, steps, STEP, "oscillation lagged")
+    weak = march(strip(Penalty(1.0)), steps, STEP, "oscillation weak")
+    growing = {dt: march(scene, GROWTH_STEPS, dt, f"oscillation lagged, {dt:g} s") for dt in TIME_STEPS}
+    return Strips(scene, lagged, weak, growing)
+
+
+def march(scene: Scene, steps: int, dt: float, label: str) -> March:
+    """A disturbed strip over `steps` steps."""
     probe = Probe(NODE_A, "displacement")
     result = scene.run(steps * dt, Fixed(dt), [probe, Progress(label)], resume=disturbed(scene))
-    return probe.time, probe.values["displacement"][:, 1], result
+    return March(dt, probe.time, probe.values["displacement"][:, 1], result)
 
 
 def measured_growth(displacement: NDArray) -> float:
@@ -90,52 +103,65 @@ def measured_growth(displacement: NDArray) -> float:
     return float(size * np.sign(displacement[clean[1]] / displacement[clean[0]]))
 
 
-def run(quick: bool = False) -> Findings:
-    """Lagged against weak, and the growth for step sizes over three decades."""
-    steps = 30 if quick else 60
-    lagged_scene = scene(Lagged())
-    time, lagged, lagged_run = march(lagged_scene, steps, STEP, "oscillation lagged")
-    weak_time, weak, weak_run = march(scene(Penalty(1.0)), steps, STEP, "oscillation weak")
-    runs = [lagged_run, weak_run]
-
-    numbers: dict[str, float | int | str] = {
+def numbers(strips: Strips) -> dict[str, float | int | str]:
+    """Growth measured and predicted, and how far node A moves."""
+    lagged, weak = strips.lagged.moved, strips.weak.moved
+    found: dict[str, float | int | str] = {
         "lagged_growth_per_step": measured_growth(lagged),
-        "lagged_growth_predicted": growth_factor(lagged_scene, STEP).factor.real,
+        "lagged_growth_predicted": growth_factor(strips.lagged_scene, STEP).factor.real,
         "lagged_visible_step": int(np.flatnonzero(np.abs(lagged) > 1e-6)[0]),
         "lagged_max_mm": float(np.abs(lagged).max()),
         "weak_max_mm": float(np.abs(weak).max()),
         "column_factor": lagged_column_factor(TABLE_1, BATH),
+        "lagged_rejected_steps": strips.lagged.result.rejections,
     }
-    growing: dict[float, NDArray] = {}
-    for dt in (0.1, 1.0, 10.0, 100.0):
-        _, growing[dt], result = march(lagged_scene, GROWTH_STEPS, dt, f"oscillation lagged, {dt:g} s")
-        runs.append(result)
-        numbers[f"lagged_growth_at_{dt:g}_s"] = measured_growth(growing[dt])
-        numbers[f"lagged_growth_at_{dt:g}_s_predicted"] = growth_factor(lagged_scene, dt).factor.real
-    numbers |= {"mesh": "1 x 30 quadrilaterals, order 2", "step_s": STEP, **cost(runs)}
+    if strips.lagged.shortened_from is not None:
+        found["lagged_first_shortened_step_s"] = strips.lagged.shortened_from
+    for dt, march in strips.growing.items():
+        found[f"lagged_growth_at_{dt:g}_s"] = measured_growth(march.moved)
+        found[f"lagged_growth_at_{dt:g}_s_predicted"] = growth_factor(strips.lagged_scene, dt).factor.real
+    for across, along in MESHES:
+        scene = strip(Lagged(), cells=(across, along))
+        found[f"lagged_growth_predicted_{across}x{along}"] = growth_factor(scene, STEP).factor.real
+    runs = [strips.lagged.result, strips.weak.result, *(march.result for march in strips.growing.values())]
+    return found | {"mesh": "1 x 30 quadrilaterals, order 2", "step_s": STEP, **cost(runs)}
 
-    figure = plt.figure(figsize=(8.0, 4.2))
-    grid = figure.add_gridspec(2, 2, width_ratios=(1.6, 1))
+
+def draw(strips: Strips) -> Figure:
+    """Node A over time, lagged above weak; on the right the growth for all time steps."""
+    figure = plt.figure(figsize=(8.6, 4.4))
+    grid = figure.add_gridspec(2, 2, width_ratios=(1.7, 1))
     above = figure.add_subplot(grid[0, 0])
     below = figure.add_subplot(grid[1, 0], sharex=above)
     growth = figure.add_subplot(grid[:, 1])
-    above.plot(time, lagged, "k-", lw=1, marker=".", ms=3)
+    above.plot(strips.lagged.time, strips.lagged.moved, "k-", lw=1, marker=".", ms=3)
     above.set_title("values prescribed with the charge of the last step")
-    below.plot(weak_time, weak, "k-", lw=1)
+    below.plot(strips.weak.time, strips.weak.moved, "k-", lw=1)
     below.set_title("imposed weakly, $\\varepsilon = 1$")
-    limit = 1.1 * float(np.abs(lagged).max())
+    limit = 1.1 * float(np.abs(strips.lagged.moved).max())
     for axes in (above, below):
         axes.set(ylabel="$u_y$ of node A [mm]", ylim=(-limit, limit))
-    below.annotate(f"largest: {np.abs(weak).max():.1e} mm", (0.02, 0.85), xycoords="axes fraction", fontsize=8)
-    below.set(xlabel="time [s]", xlim=(0, time[-1]))
-    for (dt, u), style in zip(growing.items(), ("-", "--", "-.", ":"), strict=True):
-        growth.semilogy(np.abs(u), "k" + style, lw=1, label=f"{dt:g} s")
-    growth.set(xlabel="step", ylabel="$|u_y|$ of node A [mm]", xlim=(0, GROWTH_STEPS), title="growth, lagged")
+    mark_steps(above, strips.lagged)
+    below.annotate(f"steps of {STEP:g} s; largest $|u_y|$: {np.abs(strips.weak.moved).max():.1e} mm", (0.02, 0.85),
+                   xycoords="axes fraction", fontsize=8)  # fmt: skip
+    below.set(xlabel="time [s]", xlim=(0, strips.lagged.time[-1]))
+    for (dt, march), style in zip(strips.growing.items(), ("-", "--", "-.", ":"), strict=True):
+        growth.semilogy(np.abs(march.moved), "k" + style, lw=1, label=f"{dt:g} s")
+    growth.set(xlabel="step [-]", ylabel="$|u_y|$ of node A [mm]", xlim=(0, GROWTH_STEPS), title="growth, lagged")
     growth.legend(title="time step", loc="lower right")
-    rows = [
-        (name, STEP, float(t), float(u))
-        for name, times, values in (("lagged", time, lagged), ("weak", weak_time, weak))
-        for t, u in zip(times, values, strict=True)
-    ]
-    rows += [("lagged", dt, k * dt, float(u)) for dt, values in growing.items() for k, u in enumerate(values)]
-    return Findings(figure, ("treatment", "step_s", "time_s", "uy_node_A_mm"), rows, numbers)
+    letter_panels([above, below, growth])
+    return figure
+
+
+def mark_steps(axes: Axes, march: March) -> None:
+    """Say how long the steps are, and shade where the control of the steps has shortened them."""
+    axes.annotate(f"steps of {march.dt:g} s", (0.02, 0.85), xycoords="axes fraction", fontsize=8)
+    since = march.shortened_from
+    if since is None:
+        return
+    axes.axvspan(since, march.time[-1], color="0.9", lw=0, zorder=0)
+    axes.axvline(since, color="0.4", lw=0.8, ls=":")
+    shortest = float(np.diff(march.time).min())
+    axes.annotate(f"from {since:g} s shortened, down to {shortest:.2g} s\n({march.result.rejections} steps rejected)",
+                  (since, 0.03), (-4, 0), xycoords=axes.get_xaxis_transform(), textcoords="offset points",
+                  ha="right", va="bottom", fontsize=8)  # fmt: skip
