@@ -18,7 +18,8 @@ rest. Numbers (areas are relative to the area at 7000 s; errors are estimates of
 from __future__ import annotations
 
 import argparse
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass
 from time import perf_counter
 
 import matplotlib.pyplot as plt
@@ -28,75 +29,26 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection
 from matplotlib.colors import BoundaryNorm
 from matplotlib.figure import Figure
-from ngsolve import IfPos, x, y
 from numpy.typing import NDArray
 
-from ngswell import (
-    BACKWARD_EULER,
-    TABLE_2,
-    Adaptive,
-    Area,
-    Bath,
-    Blend,
-    Concentration,
-    Ledger,
-    Penalty,
-    Pin,
-    PlaneStrain,
-    Probe,
-    Progress,
-    Ramp,
-    Result,
-    Scene,
-    Snapshots,
-    Symmetry,
-    rectangle,
-)
-from ngswell.baths.bath import Treatment
+from ngswell import BACKWARD_EULER, TABLE_2, Adaptive, Area, Ledger, Probe, Progress, Result, Scene, Snapshots
 from ngswell.closed_forms.homogeneous import homogeneous_equilibrium
-from ngswell.models.model import Model
 from ngswell.plotting import on_deformed_body
-from studies.output import Findings, cost
+from studies.output import Findings, cost, letter_panels
+from studies.scenes import BOTTOM, END, HEIGHT, INITIAL, SIDE, WIDTH, free_swelling_block, with_model
 
-WIDTH, HEIGHT = 1.1, 1.0  # mm
-INITIAL, END, AT_REST = 7000.0, 11000.0, 2e5  # s
-SIDE = Ramp((7000, 4.1), (7080, 2.7), (7220, 0.3))  # s, mol/l: top and left
-BOTTOM = Ramp((7000, 4.1), (7080, 2.7), (8000, 2.7), (10000, 0.3))
+scene, remodelled = free_swelling_block, with_model  # TODO remove
+
+AT_REST = 2e5  # s
 PICTURES = (0.0, 7000.0, 7107.0, 7224.0, 7650.0, 11000.0)  # s
 REFINEMENT = 1.5
 CORE, CORNER, BOTTOM_MIDDLE = (WIDTH, HEIGHT / 2), (0.0, HEIGHT), (WIDTH, 0.0)
-
-
-def scene(nx: int, ny: int) -> Scene:
-    """The block of Table 2 on nx × ny quadrilaterals; around the bottom left corner the baths blend over 0.3 mm."""
-
-    def fading(distance):  # type: ignore[no-untyped-def]
-        return 0.5 * IfPos(0.3 - distance, (0.3 - distance) / 0.3, 0.0)
-
-    weak = Penalty(40.0)
-    return Scene(
-        mesh=rectangle(WIDTH, HEIGHT, nx, ny),
-        kinematics=PlaneStrain(),
-        material=TABLE_2,
-        model=Concentration(),
-        charge=Ramp((0, 0.0), (4000, 1.0)),
-        supports=[Symmetry("right"), Pin((0.0, 0.0), "y")],
-        baths=[
-            Bath("top", c=SIDE, treatment=weak),
-            Bath("left", c=Blend(SIDE, BOTTOM, fading(y)), treatment=weak),
-            Bath("bottom", c=Blend(BOTTOM, SIDE, fading(x)), treatment=weak),
-        ],
-    )
-
-
-def remodelled(paper: Scene, model: Model, treatment: Treatment | None = None) -> Scene:
-    """A scene with another model, its baths imposed by `treatment` or as that model does by default."""
-    return replace(paper, model=model, baths=[replace(bath, treatment=treatment) for bath in paper.baths])
+LEVELS = np.linspace(-0.02, 0.16, 10)  # N/mm²
 
 
 @dataclass(frozen=True)
-class Course:
-    """A run of the scene with what was watched."""
+class WatchedBlock:
+    """A run of the block with what was watched."""
 
     scene: Scene
     result: Result
@@ -132,17 +84,15 @@ class Course:
         return float(J.min()), float(self.core.time[np.argmin(J)])
 
 
-def course(nx: int, ny: int, tolerance: float, from_rest: bool = False) -> Course:
-    """Run the scene to 11000 s, `from_rest` from the state at 7000 s that `equilibrate` reaches directly."""
-    block = scene(nx, ny)
-    begin = block.equilibrate(INITIAL) if from_rest else None
-    area, ledger = Area(), Ledger()
-    core, corner, bottom = Probe(CORE, "J"), Probe(CORNER, "J"), Probe(BOTTOM_MIDDLE, "displacement")
-    pictures = Snapshots([time for time in PICTURES if time >= (INITIAL if from_rest else 0.0)])
-    label = f"free_swelling {nx} x {ny}, tolerance {tolerance:g}"
-    observers = [area, core, corner, bottom, ledger, pictures, Progress(label)]
-    result = block.run(END, Adaptive(tolerance, scheme=BACKWARD_EULER), observers, resume=begin)
-    return Course(block, result, area, core, corner, bottom, ledger, pictures)
+@dataclass(frozen=True)
+class Blocks:
+    """The block on the paper's mesh, on a finer one, in finer steps; the first one's way to rest, and its area on it."""
+
+    base: WatchedBlock
+    finer_mesh: WatchedBlock
+    finer_steps: WatchedBlock
+    to_rest: Result
+    rest: Area
 
 
 def options(parser: argparse.ArgumentParser) -> None:
@@ -153,18 +103,51 @@ def options(parser: argparse.ArgumentParser) -> None:
 def run(quick: bool = False, from_rest: bool = False) -> Findings:
     """The scene on the paper's mesh, once finer in space, once in time, and on to rest."""
     nx, ny, tolerance = (10, 10, 8e-3) if quick else (22, 20, 1e-3)
-    base = course(nx, ny, tolerance, from_rest)
-    finer_mesh = course(round(REFINEMENT * nx), round(REFINEMENT * ny), tolerance, from_rest)
-    finer_step = course(nx, ny, tolerance / 4, from_rest)
-    rest = Area()
-    progress = Progress("free_swelling to rest")
-    to_rest = base.scene.run(AT_REST, Adaptive(tolerance, scheme=BACKWARD_EULER), [rest, progress], resume=base.result.end)
+    blocks = compute(nx, ny, tolerance, from_rest)
+    found = numbers(blocks)
+    found |= direct_against_ramp(blocks.base.scene, tolerance)
+    found |= {"mesh": f"{nx} x {ny} quadrilaterals, order 2", "tolerance": tolerance}
+    found |= cost([blocks.base.result, blocks.finer_mesh.result, blocks.finer_steps.result, blocks.to_rest])
+    rows = blocks.base.rows("base") + blocks.finer_mesh.rows("finer mesh") + blocks.finer_steps.rows("finer steps")
+    way = zip(blocks.rest.time, blocks.rest.values, strict=True)
+    rows += [("to rest", float(t), float(a) / blocks.base.initial_area) for t, a in way]
+    header = ("run", "time_s", "area_ratio", "core_J", "corner_J", "arch_mm")
+    return Findings(draw(blocks.base, blocks.finer_mesh), header, rows, found)
 
+
+def compute(nx: int, ny: int, tolerance: float, from_rest: bool) -> Blocks:
+    """All runs."""
+    base = watch(nx, ny, tolerance, from_rest)
+    finer_mesh = watch(round(REFINEMENT * nx), round(REFINEMENT * ny), tolerance, from_rest)
+    finer_steps = watch(nx, ny, tolerance / 4, from_rest)
+    rest = Area()
+    observers = [rest, Progress("free_swelling to rest")]
+    to_rest = base.scene.run(AT_REST, Adaptive(tolerance, scheme=BACKWARD_EULER), observers, resume=base.result.end)
+    return Blocks(base, finer_mesh, finer_steps, to_rest, rest)
+
+
+def watch(nx: int, ny: int, tolerance: float, from_rest: bool = False) -> WatchedBlock:
+    """Run the scene to 11000 s, `from_rest` from the state at 7000 s that `equilibrate` reaches directly."""
+    block = free_swelling_block(nx, ny)
+    begin = block.equilibrate(INITIAL) if from_rest else None
+    area, ledger = Area(), Ledger()
+    core, corner, bottom = Probe(CORE, "J"), Probe(CORNER, "J"), Probe(BOTTOM_MIDDLE, "displacement")
+    pictures = Snapshots([time for time in PICTURES if time >= (INITIAL if from_rest else 0.0)])
+    label = f"free_swelling {nx} x {ny}, tolerance {tolerance:g}"
+    observers = [area, core, corner, bottom, ledger, pictures, Progress(label)]
+    result = block.run(END, Adaptive(tolerance, scheme=BACKWARD_EULER), observers, resume=begin)
+    return WatchedBlock(block, result, area, core, corner, bottom, ledger, pictures)
+
+
+def numbers(blocks: Blocks) -> dict[str, float | int | str]:
+    """States at 7000 s and at rest against closed forms, what happens between, and estimated errors."""
+    base = blocks.base
     swollen = homogeneous_equilibrium(TABLE_2, SIDE.values[0], "plane strain")
     final = homogeneous_equilibrium(TABLE_2, SIDE.values[-1], "plane strain")
     J = base.initial_area / (WIDTH * HEIGHT)
     core_min, core_min_time = base.core_minimum
-    numbers: dict[str, float | int | str] = {
+    imbalance = base.ledger.imbalance()
+    return {
         "initial_J": J,
         "initial_cfc": (1 - TABLE_2.nS0) * TABLE_2.cfc0 / (J - TABLE_2.nS0),
         "initial_nS": TABLE_2.nS0 / J,
@@ -179,26 +162,27 @@ def run(quick: bool = False, from_rest: bool = False) -> Findings:
         "arch_max_time_s": float(base.bottom.time[np.argmax(base.arch)]),
         "area_ratio_7220": base.ratio(7220.0),
         "area_ratio_11000": base.ratio(END),
-        "area_ratio_equilibrium": float(rest.values[-1]) / base.initial_area,
+        "area_ratio_equilibrium": float(blocks.rest.values[-1]) / base.initial_area,
         "closed_form_area_ratio_equilibrium": final.J / swollen.J,
+        **estimated_errors(blocks),
+        "fluid_imbalance": imbalance["fluid"],
+        "cation_imbalance": imbalance["cations"],
     }
-    numbers |= direct_against_ramp(base.scene, tolerance)
-    in_space = REFINEMENT**2 / (REFINEMENT**2 - 1)
-    for key, value in (
-        ("area_ratio_7220", lambda c: c.ratio(7220.0)),
-        ("area_ratio_11000", lambda c: c.ratio(END)),
-        ("core_J_min", lambda c: c.core_minimum[0]),
-    ):
-        numbers[f"{key}_mesh_error"] = in_space * (value(base) - value(finer_mesh))
-        numbers[f"{key}_step_error"] = 2 * (value(base) - value(finer_step))
-    imbalance = base.ledger.imbalance()
-    numbers |= {"fluid_imbalance": imbalance["fluid"], "cation_imbalance": imbalance["cations"]}
-    numbers |= {"mesh": f"{nx} x {ny} quadrilaterals, order 2", "tolerance": tolerance}
-    numbers |= cost([base.result, finer_mesh.result, finer_step.result, to_rest])
 
-    rows = base.rows("base") + finer_mesh.rows("finer mesh") + finer_step.rows("finer steps")
-    rows += [("to rest", float(t), float(a) / base.initial_area) for t, a in zip(rest.time, rest.values, strict=True)]
-    return Findings(draw(base, finer_mesh), ("run", "time_s", "area_ratio", "core_J", "corner_J", "arch_mm"), rows, numbers)
+
+def estimated_errors(blocks: Blocks) -> dict[str, float]:
+    """Errors of the mesh (second order) and of the steps (first order) from the finer runs."""
+    in_space = REFINEMENT**2 / (REFINEMENT**2 - 1)
+    quantities: dict[str, Callable[[WatchedBlock], float]] = {
+        "area_ratio_7220": lambda block: block.ratio(7220.0),
+        "area_ratio_11000": lambda block: block.ratio(END),
+        "core_J_min": lambda block: block.core_minimum[0],
+    }
+    errors = {}
+    for key, value in quantities.items():
+        errors[f"{key}_mesh_error"] = in_space * (value(blocks.base) - value(blocks.finer_mesh))
+        errors[f"{key}_step_error"] = 2 * (value(blocks.base) - value(blocks.finer_steps))
+    return errors
 
 
 def direct_against_ramp(block: Scene, tolerance: float) -> dict[str, float]:
@@ -210,32 +194,41 @@ def direct_against_ramp(block: Scene, tolerance: float) -> dict[str, float]:
     return {"ramp_seconds": ramp.seconds, "equilibrate_seconds": direct, "ramp_over_equilibrate": ramp.seconds / direct}
 
 
-def draw(base: Course, finer: Course) -> Figure:
+def draw(base: WatchedBlock, finer: WatchedBlock) -> Figure:
     """Six pictures of the deformed, mirrored block, beside histories of bath, area and core."""
-    figure = plt.figure(figsize=(9.6, 6.4))
+    figure = plt.figure(figsize=(9.6, 6.6))
     grid = figure.add_gridspec(3, 3, width_ratios=(1.25, 1.25, 1))
-    levels = np.linspace(-0.02, 0.16, 10)
-    norm = BoundaryNorm(levels, 256, extend="both")
-    axes: list[Axes] = []
-    for number, state in enumerate(base.pictures.states):
-        ax = figure.add_subplot(grid[number // 2, number % 2])
-        axes.append(ax)
+    norm = BoundaryNorm(LEVELS, 256, extend="both")
+    pictures = [figure.add_subplot(grid[n // 2, n % 2]) for n in range(len(base.pictures.states))]
+    draw_pictures(pictures, base, norm)
+    figure.colorbar(
+        ScalarMappable(norm), ax=pictures, label="overall pressure p [N/mm²]", location="bottom", shrink=0.6, aspect=40
+    )
+    histories = [figure.add_subplot(grid[row, 2]) for row in range(3)]
+    draw_histories(histories, base, finer)
+    letter_panels([*pictures, *histories])
+    return figure
+
+
+def draw_pictures(panels: list[Axes], base: WatchedBlock, norm: BoundaryNorm) -> None:
+    """Overall pressure on the deformed block, mirrored."""
+    for number, (ax, state) in enumerate(zip(panels, base.pictures.states, strict=True)):
         base.scene.problem.restore(state)
         half = on_deformed_body(base.scene.problem, base.scene.problem.state.p)
         for part in (half, half.mirrored(WIDTH)):
-            ax.tricontourf(part.mesh, part.values, levels=levels, norm=norm, extend="both")
+            ax.tricontourf(part.mesh, part.values, levels=LEVELS, norm=norm, extend="both")
             ax.add_collection(LineCollection(list(part.outlines), colors="k", linewidths=0.12))
         ax.set(title=f"{state.time:g} s", aspect="equal", xlim=(-0.95, 3.15), ylim=(-0.25, 1.95))
         ax.grid(False)
         if number % 2 == 0:
             ax.set_ylabel("y [mm]")
-        if number >= 4:
+        if number >= len(panels) - 2:
             ax.set_xlabel("x [mm]")
-    figure.colorbar(
-        ScalarMappable(norm), ax=axes, label="overall pressure p [N/mm²]", location="bottom", shrink=0.6, aspect=40
-    )
 
-    baths, area, core = (figure.add_subplot(grid[row, 2]) for row in range(3))
+
+def draw_histories(panels: list[Axes], base: WatchedBlock, finer: WatchedBlock) -> None:
+    """Baths, area on both meshes, J at the core and at the corner."""
+    baths, area, core = panels
     time = np.linspace(6800, END, 2000)
     baths.plot(time / 1000, np.interp(time, SIDE.times, SIDE.values), "k-", label="top, left")
     baths.plot(time / 1000, np.interp(time, BOTTOM.times, BOTTOM.values), "k--", label="bottom")
@@ -247,8 +240,7 @@ def draw(base: Course, finer: Course) -> Figure:
     area.legend(loc="lower right")
     core.plot(base.core.time / 1000, base.core.values["J"], "k-", label="core")
     core.plot(base.corner.time / 1000, base.corner.values["J"], "k:", label="top corner")
-    core.set(ylabel="J", xlabel="time [1000 s]", ylim=(0.8, 4.3))
+    core.set(ylabel="J [-]", xlabel="time [1000 s]", ylim=(0.8, 4.3))
     core.legend(loc="upper right", ncols=2)
-    for ax in (baths, area, core):
+    for ax in panels:
         ax.set_xlim(6.8, END / 1000)
-    return figure
