@@ -12,7 +12,8 @@ Tolerance 1e-3, both models with their default baths, one thread. For each MODEL
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from statistics import median
 from time import perf_counter
 
@@ -22,13 +23,77 @@ from ngsolve import SetNumThreads, TaskManager, ngsglobals
 from threadpoolctl import threadpool_limits
 
 from ngswell import Adaptive, Concentration, Potential, Progress, Result, Scene
+from ngswell.models.model import Model
 from ngswell.solve.direct import solver_of
-from studies.output import Findings, cost
-from studies.paper import free_swelling
-from studies.paper.free_swelling import INITIAL
+from studies.output import Findings, cost, letter_panels
+from studies.scenes import INITIAL, free_swelling_block, with_model
 
 UNTIL = 7220.0  # s
 PARTS = ("tangent", "residual", "bounds", "factorise", "solve")
+MESHES = {"44x40": (44, 40), "88x80": (88, 80)}
+QUICK_MESHES = {"44x40": (11, 10), "88x80": (22, 20)}
+"""The keys stay those of the full size."""
+
+MODELS: dict[str, Model] = {"potential": Potential(), "concentration": Concentration()}
+
+
+@dataclass(frozen=True)
+class IterationCost:
+    """Milliseconds of each part alone, and the run in which they are taken together."""
+
+    mesh: str
+    model: str
+    parts: dict[str, float]
+    unknowns: int
+    result: Result
+
+    @property
+    def label(self) -> str:
+        return f"{self.model}_{self.mesh}"
+
+    def found(self) -> dict[str, float]:
+        """Its numbers."""
+        linear = self.result.factorisations * self.parts["factorise"] + self.result.solves * self.parts["solve"]
+        return {
+            **{f"{part}_ms": self.parts[part] for part in PARTS},
+            "full_iteration_ms": sum(self.parts[part] for part in PARTS),
+            "iteration_ms": 1e3 * self.result.seconds / self.result.iterations,
+            "iterations_per_matrix": self.result.iterations / self.result.factorisations,
+            "overhead": 1e3 * self.result.seconds / linear,
+            "unknowns": self.unknowns,
+        }
+
+
+def run(quick: bool = False) -> Findings:
+    """Both models, two meshes."""
+    meshes, turns = (QUICK_MESHES, 3) if quick else (MESHES, 7)
+    costs = compute(meshes, turns)
+    numbers: dict[str, float | int | str] = {f"{c.label}_{key}": value for c in costs for key, value in c.found().items()}
+    numbers |= {"mesh": ", ".join(f"{nx} x {ny}" for nx, ny in meshes.values()), **cost([c.result for c in costs])}
+    header = ("case", *costs[0].found(), "newton_iterations", "factorisations", "solves", "seconds")
+    rows = [
+        (c.label, *c.found().values(), c.result.iterations, c.result.factorisations, c.result.solves, c.result.seconds)
+        for c in costs
+    ]
+    return Findings(draw(costs, list(meshes.values())), header, rows, numbers)
+
+
+def compute(meshes: dict[str, tuple[int, int]], turns: int) -> list[IterationCost]:
+    """Every model on every mesh, on one thread."""
+    threads_before = ngsglobals.numthreads
+    SetNumThreads(1)
+    try:
+        return [measure(mesh, cells, model, turns) for mesh, cells in meshes.items() for model in MODELS]
+    finally:
+        SetNumThreads(threads_before)
+
+
+def measure(mesh: str, cells: tuple[int, int], model: str, turns: int) -> IterationCost:
+    """One run from rest, and the parts of an iteration at its end."""
+    scene = with_model(free_swelling_block(*cells), MODELS[model])
+    rest = scene.equilibrate(INITIAL)
+    result = scene.run(UNTIL, Adaptive(1e-3), [Progress(f"iteration {model}_{mesh}")], resume=rest)
+    return IterationCost(mesh, model, alone(scene, turns), scene.problem.space.ndof, result)
 
 
 def alone(scene: Scene, turns: int) -> dict[str, float]:
@@ -56,56 +121,28 @@ def alone(scene: Scene, turns: int) -> dict[str, float]:
     return {name: median(times) for name, times in taken.items()}
 
 
-def run(quick: bool = False) -> Findings:
-    """Both models, two meshes."""
-    meshes = [(11, 10), (22, 20)] if quick else [(44, 40), (88, 80)]
-    names = ["44x40", "88x80"]
-    numbers: dict[str, float | int | str] = {}
-    rows: list[tuple[object, ...]] = []
-    results: list[Result] = []
-    threads_before = ngsglobals.numthreads
-    SetNumThreads(1)
-    for name, (nx, ny) in zip(names, meshes, strict=True):
-        for model in (Potential(), Concentration()):
-            scene = free_swelling.remodelled(free_swelling.scene(nx, ny), model)
-            rest = scene.equilibrate(INITIAL)
-            label = f"{type(model).__name__.lower()}_{name}"
-            result = scene.run(UNTIL, Adaptive(1e-3), [Progress(f"iteration {label}")], resume=rest)
-            results.append(result)
-            parts = alone(scene, 3 if quick else 7)
-            linear = result.factorisations * parts["factorise"] + result.solves * parts["solve"]
-            found = {
-                **{f"{part}_ms": parts[part] for part in PARTS},
-                "full_iteration_ms": sum(parts[part] for part in PARTS),
-                "iteration_ms": 1e3 * result.seconds / result.iterations,
-                "iterations_per_matrix": result.iterations / result.factorisations,
-                "overhead": 1e3 * result.seconds / linear,
-                "unknowns": scene.problem.space.ndof,
-            }
-            numbers |= {f"{label}_{key}": value for key, value in found.items()}
-            rows.append((label, *found.values(), result.iterations, result.factorisations, result.solves, result.seconds))
-    SetNumThreads(threads_before)
-    numbers |= {"mesh": ", ".join(f"{nx} x {ny}" for nx, ny in meshes), **cost(results)}
-    header = ("case", *found, "newton_iterations", "factorisations", "solves", "seconds")
-    return Findings(draw(numbers, names), header, rows, numbers)
+FILLS = (("0.15", ""), ("0.95", ""), ("0.35", ""), ("0.6", "////"), ("0.85", "...."))
+"""Shade and hatch of each part."""
 
 
-def draw(numbers: dict[str, float | int | str], names: list[str]) -> Figure:
-    """Parts of an iteration with its own matrix, and the mean iteration of the run, per case."""
-    figure, axes = plt.subplots(1, 2, figsize=(8.0, 3.6))
-    for ax, name in zip(axes, names, strict=True):
-        cases = [f"{model}_{name}" for model in ("potential", "concentration")]
-        bottom = [0.0] * len(cases)
-        for number, part in enumerate(PARTS):
-            heights = [float(numbers[f"{case}_{part}_ms"]) for case in cases]
-            ax.bar(
-                range(len(cases)), heights, 0.5, bottom, color=str(0.15 + 0.18 * number), edgecolor="k", lw=0.4, label=part
-            )
+def draw(costs: Sequence[IterationCost], cells: Sequence[tuple[int, int]]) -> Figure:
+    """Parts of an iteration with its own matrix, and the mean iteration of the run, a panel a mesh."""
+    figure, axes = plt.subplots(1, len(cells), figsize=(8.4, 3.6))
+    meshes = list(dict.fromkeys(c.mesh for c in costs))
+    for ax, mesh, (nx, ny) in zip(axes, meshes, cells, strict=True):
+        mine = [c for c in costs if c.mesh == mesh]
+        bottom = [0.0] * len(mine)
+        for part, shade, hatch in zip(
+            PARTS, ("0.15", "0.95", "0.35", "0.6", "0.85"), ("", "", "", "////", "...."), strict=True
+        ):
+            heights = [c.parts[part] for c in mine]
+            ax.bar(range(len(mine)), heights, 0.5, bottom, color=shade, hatch=hatch, edgecolor="k", lw=0.4, label=part)
             bottom = [low + height for low, height in zip(bottom, heights, strict=True)]
-        mean = [float(numbers[f"{case}_iteration_ms"]) for case in cases]
-        ax.plot(range(len(cases)), mean, "kD", mfc="w", label="mean of the run")
-        ax.set_xticks(range(len(cases)), ["Potential", "Concentration"])
-        ax.set(title=name.replace("x", " × "), ylabel="milliseconds an iteration", xlim=(-0.6, 1.6))
+        ax.plot(range(len(mine)), [c.found()["iteration_ms"] for c in mine], "kD", mfc="w", label="mean of the run")
+        ax.set_xticks(range(len(mine)), [c.model.capitalize() for c in mine])
+        ax.set(title=f"{nx} × {ny} cells", ylabel="time of an iteration [ms]", xlim=(-0.6, 1.6))
         ax.grid(False, axis="x")
-    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside right center", fontsize=8)
+    letter_panels(axes)
+    handles, labels = axes[0].get_legend_handles_labels()
+    figure.legend(handles[::-1], labels[::-1], loc="outside right center", fontsize=8)
     return figure
