@@ -20,12 +20,14 @@ from dataclasses import dataclass
 
 import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection
 from matplotlib.colors import BoundaryNorm
 from matplotlib.figure import Figure
+from mpl_toolkits.mplot3d import Axes3D
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
-from ngsolve import CF, ET, IfPos, IntegrationRule, x, y, z
+from ngsolve import CF, ET, IntegrationRule, x, y, z
 from numpy.typing import NDArray
 
 from ngswell import (
@@ -35,7 +37,6 @@ from ngswell import (
     Area,
     Axisymmetric,
     Bath,
-    Blend,
     Ledger,
     Penalty,
     Pin,
@@ -50,32 +51,24 @@ from ngswell import (
     rectangle,
 )
 from ngswell.closed_forms.homogeneous import homogeneous_equilibrium
-from ngswell.plotting import on_deformed_body
-from studies.output import Findings, cost
-from studies.paper.free_swelling import BOTTOM, END, INITIAL, SIDE
+from ngswell.plotting import Picture, on_deformed_body
+from studies.output import Findings, cost, letter_panels
+from studies.scenes import END, INITIAL, SIDE, blended_baths
 
 RADIUS, HEIGHT = 1.1, 1.0  # mm
 AT_REST = 1e6  # s
 PICTURES = (7000.0, 7224.0, 7650.0, 11000.0)  # s
-LEVELS = np.linspace(-0.04, 0.16, 11)  # N/mm²
+HEADER = ("body", "time_s", "volume_ratio", "core_J")
 
 
 def disc(n: int) -> Scene:
     """The disc in the (r, z) half-plane; its baths blend over 0.3 mm at the bottom's rim."""
-    from_rim = RADIUS - x
-    outside = Blend(SIDE, BOTTOM, 0.5 * IfPos(0.3 - y, (0.3 - y) / 0.3, 0.0))
-    below = Blend(BOTTOM, SIDE, 0.5 * IfPos(0.3 - from_rim, (0.3 - from_rim) / 0.3, 0.0))
-    weak = Penalty(40.0)
     return Scene(
         mesh=rectangle(RADIUS, HEIGHT, n, n),
         kinematics=Axisymmetric(),
         material=TABLE_2,
         supports=[Symmetry("left"), Pin((RADIUS, 0.0), "z")],
-        baths=[
-            Bath("top", c=SIDE, treatment=weak),
-            Bath("right", c=outside, treatment=weak),
-            Bath("bottom", c=below, treatment=weak),
-        ],
+        baths=blended_baths(Penalty(40.0), side="right", from_side=RADIUS - x),
         start=INITIAL,
     )
 
@@ -92,9 +85,12 @@ def block(n: int) -> Scene:
     )
 
 
+# -- the runs ------------------------------------------------------------------------------------------------------------
+
+
 @dataclass(frozen=True)
-class Course:
-    """A run of a body with what was watched, and its volume at rest."""
+class SwellingBody:
+    """A body's runs to 11000 s and on to rest, and what was watched."""
 
     scene: Scene
     result: Result
@@ -106,16 +102,19 @@ class Course:
     ledger: Ledger
     pictures: Snapshots
 
-    def ratio(self, time: float) -> float:
-        """Volume at `time` [s] over the volume at 7000 s."""
-        return float(np.interp(time, self.volume.time, self.volume.values) / self.volume.values[0])
+    @property
+    def ratios(self) -> NDArray:
+        """Volumes over the volume at 7000 s."""
+        return np.asarray(self.volume.values) / self.volume.values[0]
 
     def numbers(self, name: str, reference_volume: float) -> dict[str, float | int | str]:
         """The numbers that both bodies have."""
         J = self.core.values["J"]
         return {
             f"{name}_initial_J": float(self.volume.values[0]) / reference_volume,
-            f"{name}_volume_ratio_11000": self.ratio(END),
+            f"{name}_volume_ratio_11000": float(
+                np.interp(END, self.volume.time, self.volume.values) / self.volume.values[0]
+            ),
             f"{name}_volume_ratio_equilibrium": float(self.resting.values[-1] / self.volume.values[0]),
             f"{name}_core_J_min": float(J.min()),
             f"{name}_core_J_min_time_s": float(self.core.time[np.argmin(J)]),
@@ -123,9 +122,9 @@ class Course:
         }
 
 
-def course(
+def swell(
     label: str, body: Scene, core: Sequence[float], rim: Sequence[float] | None, tolerance: float, pictures: Sequence[float]
-) -> Course:
+) -> SwellingBody:
     """From the swollen state at 7000 s to 11000 s, and on to rest."""
     volume, resting, ledger, snapshots = Area(), Area(), Ledger(), Snapshots(pictures)
     at_core = Probe(core, "J")
@@ -135,77 +134,132 @@ def course(
     steps = Adaptive(tolerance, scheme=BACKWARD_EULER)
     result = body.run(END, steps, observers, resume=swollen)
     rest = body.run(AT_REST, steps, [resting, Progress(f"cylinder {label} to rest")], resume=result.end)
-    return Course(body, result, rest, volume, resting, at_core, at_rim, ledger, snapshots)
+    return SwellingBody(body, result, rest, volume, resting, at_core, at_rim, ledger, snapshots)
+
+
+@dataclass(frozen=True)
+class Bodies:
+    """Disc and block, and J of the disc at rest in the last bath, reached directly."""
+
+    disc: SwellingBody
+    block: SwellingBody
+    direct_J: float
+    tolerance: float
+    mesh: str
 
 
 def run(quick: bool = False) -> Findings:
     """Both bodies."""
-    n_disc, n_block, tolerance = (10, 2, 1e-2) if quick else (20, 4, 2e-3)
-    cylinder = course("disc", disc(n_disc), (0.0, HEIGHT / 2), (0.0, 0.0), tolerance, PICTURES)
-    cuboid = course("block", block(n_block), (0.0, 0.0, 0.0), None, tolerance, PICTURES[1:])
+    found = compute(quick)
+    return Findings(draw(found.disc, found.block), HEADER, rows(found), numbers(found))
 
+
+def compute(quick: bool) -> Bodies:
+    """The runs of both bodies, and the disc's state of rest."""
+    n_disc, n_block, tolerance = (10, 2, 1e-2) if quick else (20, 4, 2e-3)
+    swollen_disc = swell("disc", disc(n_disc), (0.0, HEIGHT / 2), (0.0, 0.0), tolerance, PICTURES)
+    swollen_block = swell("block", block(n_block), (0.0, 0.0, 0.0), None, tolerance, PICTURES[1:])
+    problem = swollen_disc.scene.problem
+    problem.restore(swollen_disc.scene.equilibrate(END))
+    direct_J = problem.state.J(problem.mesh(RADIUS / 2, HEIGHT / 2))
+    mesh = f"disc {n_disc} x {n_disc} quadrilaterals, block {n_block}^3 hexahedra, order 2"
+    return Bodies(swollen_disc, swollen_block, direct_J, tolerance, mesh)
+
+
+def rows(found: Bodies) -> list[Sequence[object]]:
+    """Volume and J of the core over time."""
+    return [
+        (name, float(time), float(ratio), float(J))
+        for name, body in (("disc", found.disc), ("block", found.block))
+        for time, ratio, J in zip(body.volume.time, body.ratios, body.core.values["J"], strict=True)
+    ]
+
+
+def numbers(found: Bodies) -> dict[str, float | int | str]:
+    """The numbers of the study."""
+    cylinder, cuboid = found.disc, found.block
     swollen, final = (homogeneous_equilibrium(TABLE_2, c, "3-d") for c in (SIDE.values[0], SIDE.values[-1]))
-    numbers = cylinder.numbers("disc", np.pi * RADIUS**2 * HEIGHT) | cuboid.numbers("block", RADIUS**2 * HEIGHT / 2)
     assert cylinder.rim is not None
     arch = cylinder.rim.values["displacement"][:, 1]
-    problem = cylinder.scene.problem
-    problem.restore(cylinder.scene.equilibrate(END))
-    J = problem.state.J(problem.mesh(RADIUS / 2, HEIGHT / 2))
-    numbers |= {
+    return {
+        **cylinder.numbers("disc", np.pi * RADIUS**2 * HEIGHT),
+        **cuboid.numbers("block", RADIUS**2 * HEIGHT / 2),
         "closed_form_initial_J": swollen.J,
         "closed_form_volume_ratio_equilibrium": final.J / swollen.J,
-        "disc_equilibrate_error": abs(J / final.J - 1),
+        "disc_equilibrate_error": abs(found.direct_J / final.J - 1),
         "disc_arch_max_mm": float(arch.max()),
         "disc_arch_max_time_s": float(cylinder.rim.time[np.argmax(arch)]),
-        "mesh": f"disc {n_disc} x {n_disc} quadrilaterals, block {n_block}^3 hexahedra, order 2",
-        "tolerance": tolerance,
+        "mesh": found.mesh,
+        "tolerance": found.tolerance,
+        **cost([cylinder.result, cylinder.rest, cuboid.result, cuboid.rest]),
     }
-    numbers |= cost([cylinder.result, cylinder.rest, cuboid.result, cuboid.rest])
-    rows = [
-        (name, float(t), float(v / c.volume.values[0]), float(J))
-        for name, c in (("disc", cylinder), ("block", cuboid))
-        for t, v, J in zip(c.volume.time, c.volume.values, c.core.values["J"], strict=True)
-    ]
-    return Findings(draw(cylinder, cuboid), ("body", "time_s", "volume_ratio", "core_J"), rows, numbers)
 
 
-def draw(cylinder: Course, cuboid: Course) -> Figure:
+# -- the figure ----------------------------------------------------------------------------------------------------------
+
+
+def draw(cylinder: SwellingBody, cuboid: SwellingBody) -> Figure:
     """Sections of the disc above, the eighth of the block seen from its symmetry planes below."""
+    halves, surfaces = [], []
+    for state in cylinder.pictures.states:
+        cylinder.scene.problem.restore(state)
+        halves.append(on_deformed_body(cylinder.scene.problem, cylinder.scene.problem.state.pore_pressure))
+    for state in cuboid.pictures.states:
+        cuboid.scene.problem.restore(state)
+        surfaces.append(surface(cuboid.scene))
+    values = np.concatenate([half.values for half in halves] + [of_face for _, of_face in surfaces])
+    levels = enclosing(values)
+    norm = BoundaryNorm(levels, 256)
+
     figure = plt.figure(figsize=(10.0, 5.4))
     grid = figure.add_gridspec(2, 4, height_ratios=(1, 1.2))
-    norm = BoundaryNorm(LEVELS, 256, extend="both")
-    for column, state in enumerate(cylinder.pictures.states):
-        ax = figure.add_subplot(grid[0, column])
-        cylinder.scene.problem.restore(state)
-        half = on_deformed_body(cylinder.scene.problem, cylinder.scene.problem.state.pore_pressure)
-        for part in (half, half.mirrored(0.0)):
-            ax.tricontourf(part.mesh, part.values, levels=LEVELS, norm=norm, extend="both")
-            ax.add_collection(LineCollection(list(part.outlines), colors="k", linewidths=0.12))
-        ax.set(title=f"{state.time:g} s", aspect="equal", xlim=(-1.75, 1.75), ylim=(-0.35, 1.75), xlabel="r [mm]")
-        ax.grid(False)
-        if column == 0:
-            ax.set_ylabel("z [mm]")
-    for column, state in enumerate(cuboid.pictures.states):
-        ax = figure.add_subplot(grid[1, column], projection="3d")
-        cuboid.scene.problem.restore(state)
-        faces, values = surface(cuboid.scene)
-        colours = plt.get_cmap()(norm(values) / 256)
-        ax.add_collection3d(Poly3DCollection(faces, facecolors=colours, edgecolors=(0, 0, 0, 0.25), linewidths=0.15))
-        ax.set(xlim=(0, 1.6), ylim=(0, 1.6), zlim=(0, 0.8))
-        ax.set_box_aspect((1.6, 1.6, 0.8), zoom=1.1)
+    sections = [figure.add_subplot(grid[0, column]) for column in range(len(halves))]
+    for ax, half, state in zip(sections, halves, cylinder.pictures.states, strict=True):
+        draw_section(ax, half, levels, norm)
+        ax.set(title=f"{state.time:g} s", xlabel="r [mm]")
+    sections[0].set_ylabel("z [mm]")
+    views = [figure.add_subplot(grid[1, column], projection="3d") for column in range(len(surfaces))]
+    for ax, (faces, of_face), state in zip(views, surfaces, cuboid.pictures.states, strict=True):
+        draw_view(ax, faces, plt.get_cmap()(norm(of_face)))
         ax.set_title(f"{state.time:g} s")
-        ax.view_init(elev=24, azim=235)
-        ax.set_axis_off()
-        ax.plot((0, 0.5), (-0.15, -0.15), (0, 0), "k-", lw=1.5)  # the scale
-        ax.text(0.3, -0.42, 0.0, "0.5 mm", fontsize=7, ha="center")
     volume = figure.add_subplot(grid[1, 3])
-    for name, c, style in (("disc", cylinder, "-"), ("block", cuboid, "--")):
-        volume.plot(c.volume.time / 1000, c.volume.values / c.volume.values[0], "k" + style, label=name)
+    for name, body, style in (("disc", cylinder, "-"), ("block", cuboid, "--")):
+        volume.plot(body.volume.time / 1000, body.ratios, "k" + style, label=name)
     volume.set(xlabel="time [1000 s]", ylabel="volume / volume at 7000 s")
     volume.legend()
-    label = "overall pressure p [N/mm²]"
-    figure.colorbar(ScalarMappable(norm), ax=figure.axes[:7], label=label, location="bottom", shrink=0.5, aspect=40)
+    letter_panels([*sections, *views, volume])
+    label = f"overall pressure p [N/mm²]: {values.min():.2f} to {values.max():.2f}".replace("-", "−")
+    colours = ScalarMappable(norm)
+    figure.colorbar(
+        colours, ax=[*sections, *views], label=label, location="bottom", shrink=0.5, aspect=40, ticks=levels[::2]
+    )
     return figure
+
+
+def enclosing(values: NDArray, step: float = 0.02) -> NDArray:
+    """Levels by multiples of `step` [N/mm²] that enclose all values."""
+    first, last = np.floor(values.min() / step), np.ceil(values.max() / step)
+    return step * np.arange(first, last + 1)
+
+
+def draw_section(ax: Axes, half: Picture, levels: NDArray, norm: BoundaryNorm) -> None:
+    """The deformed section, both halves."""
+    for part in (half, half.mirrored(0.0)):
+        ax.tricontourf(part.mesh, part.values, levels=levels, norm=norm)
+        ax.add_collection(LineCollection(list(part.outlines), colors="k", linewidths=0.12))
+    ax.set(aspect="equal", xlim=(-1.9, 1.9), ylim=(-0.35, 1.75))
+    ax.grid(False)
+
+
+def draw_view(ax: Axes3D, faces: NDArray, colours: NDArray) -> None:
+    """The deformed eighth, with a scale."""
+    ax.add_collection3d(Poly3DCollection(faces, facecolors=colours, edgecolors=(0, 0, 0, 0.25), linewidths=0.15))
+    ax.set(xlim=(0, 1.6), ylim=(0, 1.6), zlim=(0, 0.8))
+    ax.set_box_aspect((1.6, 1.6, 0.8), zoom=1.1)
+    ax.view_init(elev=24, azim=235)
+    ax.set_axis_off()
+    ax.plot((0, 0.5), (-0.15, -0.15), (0, 0), "k-", lw=1.5)
+    ax.text(0.3, -0.42, 0.0, "0.5 mm", fontsize=7, ha="center")
 
 
 def surface(body: Scene, cuts: int = 3) -> tuple[NDArray, NDArray]:

@@ -6,7 +6,8 @@ from test_studies import quick
 
 from ngswell import TABLE_2
 from ngswell.closed_forms.homogeneous import homogeneous_equilibrium
-from studies.limits.convergence import VARIANTS, as_variant, growth_rates, held_sideways, swell, undrained
+from studies.limits.convergence.spectra import growth_rates, held_sideways, swell, undrained
+from studies.limits.convergence.variants import VARIANTS, as_variant
 from studies.paper.free_swelling import scene
 
 

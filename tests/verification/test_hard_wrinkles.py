@@ -12,7 +12,7 @@ from ngswell import TABLE_2, Bath, Fixed, InputError, InstabilityError, Lagged, 
 from ngswell.analysis.stability import Perturbations
 from ngswell.closed_forms.homogeneous import homogeneous_equilibrium
 from studies.hard_cases.wrinkles import CELLS, SKINNED, refinement, unresolved, wrinkles
-from studies.limits.convergence import growth_rates, held_sideways, swell
+from studies.limits.convergence.spectra import growth_rates, held_sideways, swell
 
 
 def at_rest(bath):
