@@ -39,7 +39,6 @@ from ngswell import (
     TABLE_1,
     Bath,
     Concentration,
-    Confined,
     Fixed,
     LocalDonnan,
     Material,
@@ -52,18 +51,16 @@ from ngswell import (
     Scene,
     Traction,
     Uncharged,
-    column,
     rectangle,
 )
 from ngswell.models.model import Model
 from ngswell.physics import donnan
-from studies.output import Findings, cost
+from studies.output import Findings, cost, letter_panels
+from studies.scenes import BATH, COLUMN_HEIGHT, confined_column, rest_load
 
-HEIGHT = 0.5  # mm
-BATH = 0.15  # mol/l, the bath of the start
 CHARGE = float(TABLE_1.cfc0)  # mol/l
 H = 2 * float(TABLE_1.mu) + float(TABLE_1.lam)  # N/mm², drained modulus of the confined column
-SWELLING_TIME = HEIGHT**2 / (H * float(TABLE_1.K))  # s
+SWELLING_TIME = COLUMN_HEIGHT**2 / (H * float(TABLE_1.K))  # s
 WEAK = Penalty(relative=1e4)  # for all models: the same resistance at the bath, too small to be seen
 
 MODELS: dict[str, Model] = {
@@ -81,10 +78,10 @@ BATHS = (0.14, 0.125, 0.1, 0.05)  # mol/l
 
 
 @dataclass(frozen=True)
-class Case:
-    """A column of the family: what disturbs it, its ratio H K / D and its charge cfc0 [mol/l]."""
+class Disturbance:
+    """What disturbs a column of the family, the column's ratio H K / D and its charge cfc0 [mol/l]."""
 
-    disturbance: str
+    kind: str
     ratio: float = 1.0
     cfc0: float = CHARGE
     load: float = 0.0  # N/mm², on top from the start
@@ -104,22 +101,22 @@ class Case:
         return np.unique([*np.geomspace(1e-4 * SWELLING_TIME, end, steps), SWELLING_TIME])
 
 
-def load(share: float = 0.1, ratio: float = 1.0, cfc0: float = CHARGE) -> Case:
+def load(share: float = 0.1, ratio: float = 1.0, cfc0: float = CHARGE) -> Disturbance:
     """A sudden load of `share` times the drained modulus."""
-    return Case("load", ratio, cfc0, load=share * H)
+    return Disturbance("load", ratio, cfc0, load=share * H)
 
 
-def bath_step(to: float = 0.125, ratio: float = 1.0, cfc0: float = CHARGE) -> Case:
+def bath_step(to: float = 0.125, ratio: float = 1.0, cfc0: float = CHARGE) -> Disturbance:
     """The bath at another concentration [mol/l] from the start."""
-    return Case("bath_step", ratio, cfc0, bath=Ramp((0, to)))
+    return Disturbance("bath_step", ratio, cfc0, bath=Ramp((0, to)))
 
 
-def bath_ramp(ratio: float = 1.0) -> Case:
+def bath_ramp(ratio: float = 1.0) -> Disturbance:
     """The bath falls within one swelling time."""
-    return Case("bath_ramp", ratio, bath=Ramp((0, BATH), (SWELLING_TIME, 0.125)))
+    return Disturbance("bath_ramp", ratio, bath=Ramp((0, BATH), (SWELLING_TIME, 0.125)))
 
 
-DISTURBANCES: dict[str, Callable[..., Case]] = {"load": load, "bath_step": bath_step, "bath_ramp": bath_ramp}
+DISTURBANCES: dict[str, Callable[..., Disturbance]] = {"load": load, "bath_step": bath_step, "bath_ramp": bath_ramp}
 
 
 def effective(material: Material, bath: float) -> Material:
@@ -135,46 +132,45 @@ def effective(material: Material, bath: float) -> Material:
     return replace(m, cfc0=0.0, lam=m.lam + osmotic, K=m.K / (1 + drag))
 
 
-def scene(case: Case, name: str, cells: int) -> Scene:
+def scene(case: Disturbance, name: str, cells: int) -> Scene:
     """The column in the model `name`. Uncharged, it needs no load to be at rest in its reference configuration."""
     charged = name in CHARGED
     material = effective(case.material, BATH) if name == "effective" else case.material
-    p0 = donnan.pressure(BATH, case.cfc0, material.RT) if charged else 0.0
-    return Scene(
-        mesh=column(HEIGHT, cells),
-        kinematics=Confined(),
+    p0 = rest_load(material) if charged else 0.0
+    return confined_column(
+        WEAK,
+        case.bath if charged else None,
+        cells,
         material=material if charged else replace(material, cfc0=0.0),
         model=MODELS[name],
-        supports=[Roller("bottom", "x")],
-        baths=[Bath("top", c=case.bath if charged else None, treatment=WEAK)],
         loads=[Traction("top", (-p0 - case.load,))],
         initial=(BATH if charged else None, 0.0),
     )
 
 
 @dataclass(frozen=True)
-class Run:
+class ModelAnswer:
     """One case in one model: top displacement [mm] at the case's times, unknowns, and the run."""
 
-    case: Case
+    case: Disturbance
     model: str
     top: NDArray
     unknowns: int
     result: Result
 
 
-def compute(case: Case, name: str, cells: int, steps: int) -> Run:
+def answer(case: Disturbance, name: str, cells: int, steps: int) -> ModelAnswer:
     """Run one case in one model. One step is cut to the times of the probe: all models take the same steps."""
     times = case.times(steps)
-    probe = Probe((HEIGHT,), "displacement", when=[0.0, *times])
+    probe = Probe((COLUMN_HEIGHT,), "displacement", when=[0.0, *times])
     built = scene(case, name, cells)
     result = built.run(times[-1], Fixed(float(times[-1])), [probe])
-    return Run(case, name, probe.values["displacement"], built.problem.space.ndof, result)
+    return ModelAnswer(case, name, probe.values["displacement"], built.problem.space.ndof, result)
 
 
-def compare(case: Case, cells: int, steps: int) -> tuple[list[Run], dict[str, float]]:
+def compare(case: Disturbance, cells: int, steps: int) -> tuple[list[ModelAnswer], dict[str, float]]:
     """One case in all models (effective parameters can change the answer to a load only), and their errors."""
-    runs = [compute(case, name, cells, steps) for name in MODELS if case.load or name != "effective"]
+    runs = [answer(case, name, cells, steps) for name in MODELS if case.load or name != "effective"]
     full = runs[0].top
     return runs, {run.model: float(np.abs(run.top - full).max() / abs(full[-1])) for run in runs[1:]}
 
@@ -217,63 +213,94 @@ def costs(label: str, runs: dict[str, list[tuple[int, Result]]]) -> dict[str, fl
     return numbers
 
 
+@dataclass(frozen=True)
+class Comparison:
+    """Every disturbance in all models with the models' errors; a finer mesh, finer steps; blocks of each timed model."""
+
+    ratios: tuple[float, ...]
+    found: dict[str, tuple[list[ModelAnswer], dict[str, float]]]
+    finer: dict[str, tuple[list[ModelAnswer], dict[str, float]]]
+    blocks: dict[str, list[tuple[int, Result]]]
+
+    @property
+    def errors(self) -> dict[str, dict[str, float]]:
+        return {key: error for key, (_, error) in self.found.items()}
+
+
+TIMED = tuple(name for name in MODELS if name != "effective")
+
+
 def run(quick: bool = False) -> Findings:
     """All cases in all models."""
     cells, steps, block_cells, repeats = (20, 40, 8, 2) if quick else (40, 80, 16, 5)
-    ratios = RATIOS if quick else tuple(sorted(RATIOS + BETWEEN))
-    cases: dict[str, Case] = {}
+    comparison = compute(RATIOS if quick else tuple(sorted(RATIOS + BETWEEN)), cells, steps, block_cells, repeats)
+    found = numbers(comparison)
+    found["mesh"] = f"{cells} segments; {block_cells} x {block_cells} quadrilaterals; order 2"
+    runs = [run for each, _ in [*comparison.found.values(), *comparison.finer.values()] for run in each]
+    found |= cost([r.result for r in runs] + [r for b in comparison.blocks.values() for _, r in b])
+    header = ("case", "disturbance", "model", "ratio", "cfc0_mol_l", "load_N_mm2", "bath_end_mol_l", "error",
+              "final_displacement_mm", "unknowns", "newton_iterations", "seconds")  # fmt: skip
+    rows = [
+        (key, r.case.kind, r.model, r.case.ratio, r.case.cfc0, r.case.load, r.case.bath.values[-1],
+         error.get(r.model, 0.0), float(r.top[-1]), r.unknowns, r.result.iterations, r.result.seconds)
+        for key, (each, error) in comparison.found.items()
+        for r in each
+    ]  # fmt: skip
+    return Findings(draw(comparison), header, rows, found)
+
+
+def disturbances(ratios: Sequence[float]) -> dict[str, Disturbance]:
+    """All that are run, by their keys."""
+    cases: dict[str, Disturbance] = {}
     for name, disturb in DISTURBANCES.items():
         cases |= {f"{name}_{ratio:g}": disturb(ratio=ratio) for ratio in ratios}
     for charge in CHARGES:
         cases |= {f"load_cfc0_{charge:g}": load(cfc0=charge), f"bath_step_cfc0_{charge:g}": bath_step(cfc0=charge)}
     cases |= {f"load_{share:g}_H": load(share) for share in LOADS}
-    cases |= {f"bath_to_{to:g}": bath_step(to) for to in BATHS}
+    return cases | {f"bath_to_{to:g}": bath_step(to) for to in BATHS}
 
+
+def compute(ratios: tuple[float, ...], cells: int, steps: int, block_cells: int, repeats: int) -> Comparison:
+    """All runs."""
+    cases = disturbances(ratios)
     found = {key: compare(case, cells, steps) for key, case in tqdm(cases.items(), "reductions", disable=None)}
-    errors = {key: error for key, (_, error) in found.items()}
-    numbers: dict[str, float | int | str] = {}
+    finer = {"mesh": compare(bath_step(), 2 * cells, steps), "step": compare(bath_step(), cells, 2 * steps)}
+    blocks = {name: [block(name, block_cells) for _ in range(repeats)] for name in TIMED}
+    return Comparison(ratios, found, finer, blocks)
+
+
+def numbers(comparison: Comparison) -> dict[str, float | int | str]:
+    """Errors, their order, their dependence on mesh and step, and costs."""
+    errors = comparison.errors
+    found: dict[str, float | int | str] = {}
     inner = {f"{name}_{ratio:g}" for name in DISTURBANCES for ratio in BETWEEN}
     for key in [key for key in errors if key not in inner]:
-        numbers |= {f"{model}_error_{key}": error for model, error in errors[key].items()}
+        found |= {f"{model}_error_{key}": error for model, error in errors[key].items()}
     for name in ("bath_ramp", "load"):
         slow, fast = (errors[f"{name}_{ratio:g}"]["local_donnan"] for ratio in RATIOS[1::-1])
-        numbers[f"local_donnan_order_{name}"] = float(np.log10(slow / fast))
+        found[f"local_donnan_order_{name}"] = float(np.log10(slow / fast))
     base = errors["bath_step_1"]["local_donnan"]
-    finer = {"mesh": compare(bath_step(), 2 * cells, steps), "step": compare(bath_step(), cells, 2 * steps)}
-    numbers |= {f"{what}_change": error["local_donnan"] / base - 1 for what, (_, error) in finer.items()}
-
-    runs = [run for each, _ in [*found.values(), *finer.values()] for run in each]
-    loaded = [run for ratio in ratios for run in found[f"load_{ratio:g}"][0]]
-    timed = [name for name in MODELS if name != "effective"]
-    blocks = {name: [block(name, block_cells) for _ in range(repeats)] for name in timed}
-    numbers |= costs("column", {name: [(r.unknowns, r.result) for r in loaded if r.model == name] for name in timed})
-    numbers |= costs("block", blocks)
-    numbers["mesh"] = f"{cells} segments; {block_cells} x {block_cells} quadrilaterals; order 2"
-    numbers |= cost([r.result for r in runs] + [r for b in blocks.values() for _, r in b])
-
-    header = ("case", "disturbance", "model", "ratio", "cfc0_mol_l", "load_N_mm2", "bath_end_mol_l", "error",
-              "final_displacement_mm", "unknowns", "newton_iterations", "seconds")  # fmt: skip
-    rows = [
-        (key, r.case.disturbance, r.model, r.case.ratio, r.case.cfc0, r.case.load, r.case.bath.values[-1],
-         error.get(r.model, 0.0), float(r.top[-1]), r.unknowns, r.result.iterations, r.result.seconds)
-        for key, (each, error) in found.items()
-        for r in each
-    ]  # fmt: skip
-    return Findings(picture(ratios, errors), header, rows, numbers)
+    found |= {f"{what}_change": error["local_donnan"] / base - 1 for what, (_, error) in comparison.finer.items()}
+    loaded = [run for ratio in comparison.ratios for run in comparison.found[f"load_{ratio:g}"][0]]
+    found |= costs("column", {name: [(r.unknowns, r.result) for r in loaded if r.model == name] for name in TIMED})
+    return found | costs("block", comparison.blocks)
 
 
-def picture(ratios: Sequence[float], errors: dict[str, dict[str, float]]) -> Figure:
+STYLES = {
+    ("local_donnan", "bath_step"): ("s-", "LocalDonnan, sudden change of the bath"),
+    ("local_donnan", "bath_ramp"): ("^--", "LocalDonnan, change within a swelling time"),
+    ("local_donnan", "load"): ("o:", "LocalDonnan, sudden load"),
+    ("uncharged", "load"): ("D-", "Uncharged, sudden load"),
+    ("uncharged", "bath_step"): ("x-.", "Uncharged, sudden change of the bath"),
+    ("effective", "load"): ("v--", "Uncharged, effective parameters, sudden load"),
+}
+
+
+def draw(comparison: Comparison) -> Figure:
     """Errors against the ratio of times, and against the charge."""
+    errors, ratios = comparison.errors, comparison.ratios
     figure, (left, right) = plt.subplots(1, 2, figsize=(8.0, 4.6), sharey=True, width_ratios=(1.4, 1))
-    styles = {
-        ("local_donnan", "bath_step"): ("s-", "LocalDonnan, sudden change of the bath"),
-        ("local_donnan", "bath_ramp"): ("^--", "LocalDonnan, change within a swelling time"),
-        ("local_donnan", "load"): ("o:", "LocalDonnan, sudden load"),
-        ("uncharged", "load"): ("D-", "Uncharged, sudden load"),
-        ("uncharged", "bath_step"): ("x-.", "Uncharged, sudden change of the bath"),
-        ("effective", "load"): ("v--", "Uncharged, effective parameters, sudden load"),
-    }
-    for (model, name), (style, label) in styles.items():
+    for (model, name), (style, label) in STYLES.items():
         shade = "k" if model == "local_donnan" else "0.55"
         left.loglog(ratios, [errors[f"{name}_{r:g}"][model] for r in ratios], style, color=shade, ms=4, label=label)
         if name != "bath_ramp":
@@ -284,5 +311,6 @@ def picture(ratios: Sequence[float], errors: dict[str, dict[str, float]]) -> Fig
     right.set(xlabel="fixed charge $c^{fc}_0$ [mol/l]", title=f"$H K / D$ = 1, bath {BATH:g} mol/l")
     right.set_xticks(CHARGES, [f"{charge:g}" for charge in CHARGES])
     right.minorticks_off()
+    letter_panels([left, right])
     figure.legend(*left.get_legend_handles_labels(), loc="outside lower center", ncols=2)
     return figure
