@@ -25,6 +25,7 @@ from dataclasses import dataclass, replace
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.artist import Artist
+from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.figure import Figure
@@ -37,7 +38,6 @@ from tqdm import tqdm
 from ngswell import (
     TABLE_1,
     Averaged,
-    Bath,
     Concentration,
     Fixed,
     Frozen,
@@ -46,24 +46,20 @@ from ngswell import (
     Lagged,
     LeastSquares,
     Material,
-    PlaneStrain,
     Probe,
     Result,
     Scene,
-    Symmetry,
     Traction,
-    rectangle,
 )
 from ngswell.analysis.stability import growth_factor
 from ngswell.baths.bath import Treatment
 from ngswell.closed_forms.homogeneous import homogeneous_equilibrium, lagged_column_factor
-from ngswell.physics import donnan
 from ngswell.problem.problem import Problem, Snapshot
-from studies.output import Findings, cost
-from studies.paper import oscillation
+from studies.output import Findings, cost, letter_panels
 from studies.paper.oscillation import measured_growth
+from studies.scenes import BATH, quarter_block, rest_load
+from studies.scenes import strip as strip_of_table_1
 
-BATH = 0.15  # mol/l
 STEP = 10.0  # s
 SOFT = 0.06  # N/mm², where the column grows, too
 TREATMENTS: dict[str, Treatment] = {
@@ -87,20 +83,13 @@ def material(mu: float, cfc0: float = float(TABLE_1.cfc0)) -> Material:
 
 def strip(gel: Material, treatment: Treatment, across: int = 1) -> Scene:
     """The strip of Fig. 8 under the load that holds its reference configuration at rest."""
-    load = Traction("top", (0.0, -donnan.pressure(BATH, gel.number("cfc0"), gel.RT)))
-    return replace(oscillation.scene(treatment), mesh=rectangle(0.02, 0.5, across, 30), material=gel, loads=[load])
+    load = Traction("top", (0.0, -rest_load(gel)))
+    return strip_of_table_1(treatment, cells=(across, 30), material=gel, loads=[load])
 
 
 def block(gel: Material, treatment: Treatment, cells: int = 4) -> Scene:
-    """A quarter of a block of 2 mm: symmetric to its left and bottom, the bath on top and right."""
-    return Scene(
-        mesh=rectangle(1.0, 1.0, cells, cells),
-        kinematics=PlaneStrain(),
-        material=gel,
-        model=Concentration(),
-        supports=[Symmetry("left"), Symmetry("bottom")],
-        baths=[Bath("top|right", c=BATH, treatment=treatment)],
-    )
+    """A quarter of a block of 2 mm."""
+    return quarter_block(treatment, BATH, cells, material=gel, model=Concentration())
 
 
 def reference(scene: Scene, gel: Material) -> Snapshot:
@@ -203,7 +192,7 @@ def smallest_drained_stiffness(problem: Problem) -> float:
 
 
 @dataclass(frozen=True)
-class Map:
+class GrowthMap:
     """|growth| (rows: charges, columns: stiffness) and the stiffness above which it is below 1 at each charge."""
 
     stiffness: NDArray
@@ -212,14 +201,14 @@ class Map:
     safe: NDArray
 
 
-def survey(body: Body, treatment: Treatment, stiffness: NDArray, charges: NDArray, bisections: int, label: str) -> Map:
+def survey(body: Body, treatment: Treatment, stiffness: NDArray, charges: NDArray, bisections: int, label: str) -> GrowthMap:
     """One map. Points without a state at rest are nan, and count as unsafe."""
     sizes, safe = np.empty((len(charges), len(stiffness))), np.empty(len(charges))
     for i, cfc0 in enumerate(tqdm(charges, f"stability, {label}", disable=None)):
         size = body.over_stiffness(treatment, cfc0)
         sizes[i] = [size(mu) for mu in stiffness]
         safe[i] = safe_stiffness(lambda mu, size=size: size(mu) < 1, stiffness, sizes[i] < 1, bisections)  # type: ignore[misc]
-    return Map(stiffness, charges, sizes, safe)
+    return GrowthMap(stiffness, charges, sizes, safe)
 
 
 def buckling_stiffness(cfc0: float, stiffness: NDArray, bisections: int) -> float:
@@ -238,31 +227,40 @@ def run(quick: bool = False) -> Findings:
     """Maps, then the dependence on mesh and step, then a few of the predictions against runs."""
     bisections = 2 if quick else 5
     stiffness, charges = np.geomspace(*RANGE, 3 if quick else 9), np.geomspace(*CHARGES, 3 if quick else 7)
-    maps = {
+    maps = compute(stiffness, charges, bisections)
+    load = np.array([buckling_stiffness(cfc0, stiffness, bisections) for cfc0 in charges])
+    checks, runs = measurements()
+    found = numbers(maps, charges, load) | refinement(quick) | steps(quick) | checks
+    found |= {"step_s": STEP, "mesh": "strip 1 x 30, block 4 x 4 quadrilaterals, order 2", **cost(runs)}
+    header = ("body", "treatment", "mu_N_mm2", "cfc0_mol_l", "growth_per_step", "safe_above_mu_N_mm2")
+    rows = [
+        (name, key, float(mu), float(cfc0), float(size), float(safe))
+        for (name, key), of_body in maps.items()
+        for cfc0, sizes, safe in zip(charges, of_body.sizes, of_body.safe, strict=True)
+        for mu, size in zip(stiffness, sizes, strict=True)
+    ]
+    return Findings(draw(maps, load), header, rows, found)
+
+
+def compute(stiffness: NDArray, charges: NDArray, bisections: int) -> dict[tuple[str, str], GrowthMap]:
+    """The map of every body with every treatment."""
+    return {
         (name, key): survey(body, treatment, stiffness, charges, bisections, f"{name} {key}")
         for name, body in BODIES.items()
         for key, treatment in TREATMENTS.items()
     }
-    load = np.array([buckling_stiffness(cfc0, stiffness, bisections) for cfc0 in charges])
-    numbers: dict[str, float | int | str] = {}
-    for (name, key), found in maps.items():
-        at_rest = np.isfinite(found.sizes)
-        numbers[f"{name}_{key}_safe_share"] = float((found.sizes < 1).sum() / at_rest.sum())
-        numbers |= {f"{name}_{key}_safe_mu_at_{c:g}": float(safe) for c, safe in zip(charges, found.safe, strict=True)}
+
+
+def numbers(maps: dict[tuple[str, str], GrowthMap], charges: NDArray, load: NDArray) -> dict[str, float | int | str]:
+    """Safe shares of the maps, and safe stiffness at each charge."""
+    found: dict[str, float | int | str] = {}
+    for (name, key), of_body in maps.items():
+        at_rest = np.isfinite(of_body.sizes)
+        found[f"{name}_{key}_safe_share"] = float((of_body.sizes < 1).sum() / at_rest.sum())
+        found |= {f"{name}_{key}_safe_mu_at_{c:g}": float(safe) for c, safe in zip(charges, of_body.safe, strict=True)}
     for c, mu in zip(charges, load, strict=True):
-        numbers |= {f"column_safe_mu_at_{c:g}": column_safe_stiffness(c), f"load_safe_mu_at_{c:g}": float(mu)}
-    numbers |= refinement(quick) | steps(quick)
-    checks, runs = measurements()
-    numbers |= checks
-    numbers |= {"step_s": STEP, "mesh": "strip 1 x 30, block 4 x 4 quadrilaterals, order 2", **cost(runs)}
-    header = ("body", "treatment", "mu_N_mm2", "cfc0_mol_l", "growth_per_step", "safe_above_mu_N_mm2")
-    rows = [
-        (name, key, float(mu), float(cfc0), float(size), float(safe))
-        for (name, key), found in maps.items()
-        for cfc0, sizes, safe in zip(charges, found.sizes, found.safe, strict=True)
-        for mu, size in zip(stiffness, sizes, strict=True)
-    ]
-    return Findings(picture(maps, load), header, rows, numbers)
+        found |= {f"column_safe_mu_at_{c:g}": column_safe_stiffness(c), f"load_safe_mu_at_{c:g}": float(mu)}
+    return found
 
 
 def refinement(quick: bool) -> dict[str, float | int | str]:
@@ -320,32 +318,24 @@ LEVELS = (0.0, 1.0, 1.5, 2.0, 3.0, 5.0, 8.0)
 SHADES = ("1.0", "0.9", "0.8", "0.7", "0.58", "0.46")
 
 
-def picture(maps: dict[tuple[str, str], Map], load: NDArray) -> Figure:
+def draw(maps: dict[tuple[str, str], GrowthMap], load: NDArray) -> Figure:
     """One panel for each body and treatment: white where nothing grows; the safe side of the solid line is its right."""
     shades = ListedColormap(SHADES).with_extremes(over="0.34")
     norm = BoundaryNorm(LEVELS, len(SHADES))
-    figure, panels = plt.subplots(2, len(TREATMENTS), figsize=(10.0, 5.2), sharex=True, sharey=True)
+    figure, panels = plt.subplots(2, len(TREATMENTS), figsize=(10.4, 5.4), sharex=True, sharey=True)
     for (name, key), found in maps.items():
         ax = panels[list(BODIES).index(name), list(TREATMENTS).index(key)]
-        ax.grid(False)
         ax.pcolormesh(found.stiffness, found.charges, found.sizes, norm=norm, cmap=shades, shading="nearest")
-        nowhere = np.ma.masked_where(np.isfinite(found.sizes), np.ones_like(found.sizes))
-        if nowhere.count():
-            ax.pcolor(found.stiffness, found.charges, nowhere, hatch="xxxx", facecolor="none", edgecolor="0.5", lw=0)
-        fine = np.geomspace(found.charges[0], found.charges[-1], 50)
-        ax.plot([column_safe_stiffness(c) for c in fine], fine, "k--", lw=1.2)
-        if name == "strip":
-            ax.plot(_inside(load, found.stiffness), found.charges, "k:", lw=1.6)
-        ax.plot(_inside(found.safe, found.stiffness), found.charges, "k-", lw=2)
+        draw_bounds(ax, found, load if name == "strip" else None)
         ax.set(xscale="log", yscale="log", xlim=RANGE, ylim=CHARGES)
         ax.set_xticks([0.05, 0.2, 1.0], ["0.05", "0.2", "1"])
         ax.set_yticks([0.05, 0.1, 0.2, 0.4], ["0.05", "0.1", "0.2", "0.4"])
         ax.minorticks_off()
-    for ax, title in zip(panels[0], TITLES.values(), strict=True):
-        ax.set_title(title)
+        ax.set_title(TITLES[key])
     for ax, label in zip(panels[:, 0], ROWS.values(), strict=True):
         ax.set_ylabel(f"{label}\nfixed charge $c^{{fc}}_0$ [mol/l]")
     panels[1, len(TREATMENTS) // 2].set_xlabel("shear modulus $\\mu^S$ [N/mm²]")
+    letter_panels(panels.flat)
     bar = figure.colorbar(ScalarMappable(norm, shades), ax=panels, extend="max", aspect=40, pad=0.01)
     bar.set_label("|growth per step| [-]")
     handles: list[Artist] = [
@@ -356,6 +346,19 @@ def picture(maps: dict[tuple[str, str], Map], load: NDArray) -> Figure:
     ]
     figure.legend(handles=handles, loc="outside lower center", ncols=4)
     return figure
+
+
+def draw_bounds(ax: Axes, found: GrowthMap, load: NDArray | None) -> None:
+    """Where there is no state at rest, where it is safe, where a column is, and where the load buckles the strip."""
+    ax.grid(False)
+    nowhere = np.ma.masked_where(np.isfinite(found.sizes), np.ones_like(found.sizes))
+    if nowhere.count():
+        ax.pcolor(found.stiffness, found.charges, nowhere, hatch="xxxx", facecolor="none", edgecolor="0.5", lw=0)
+    fine = np.geomspace(found.charges[0], found.charges[-1], 50)
+    ax.plot([column_safe_stiffness(c) for c in fine], fine, "k--", lw=1.2)
+    if load is not None:
+        ax.plot(_inside(load, found.stiffness), found.charges, "k:", lw=1.6)
+    ax.plot(_inside(found.safe, found.stiffness), found.charges, "k-", lw=2)
 
 
 def _inside(bound: NDArray, stiffness: NDArray) -> NDArray:
