@@ -58,6 +58,9 @@ from studies.scenes import END, INITIAL, SIDE, blended_baths
 RADIUS, HEIGHT = 1.1, 1.0  # mm
 AT_REST = 1e6  # s
 PICTURES = (7000.0, 7224.0, 7650.0, 11000.0)  # s
+LEVELS = np.array([-0.4, -0.2, -0.1, -0.05, 0, 0.025, 0.05, 0.075, 0.1, 0.15, 0.2, 0.3, 0.4, 0.6, 0.8, 1.2, 1.6])
+"""Of the overall pressure [N/mm²]: close where the bodies are most of the time, wide where the rim swells fastest."""
+
 HEADER = ("body", "time_s", "volume_ratio", "core_J")
 
 
@@ -216,30 +219,29 @@ def draw(cylinder: SwellingBody, cuboid: SwellingBody) -> Figure:
     sections = [figure.add_subplot(grid[0, column]) for column in range(len(halves))]
     for ax, half, state in zip(sections, halves, cylinder.pictures.states, strict=True):
         draw_section(ax, half, levels, norm)
-        ax.set(title=f"{state.time:g} s", xlabel="r [mm]")
+        ax.set(title=f"disc, {state.time:g} s", xlabel="r [mm]")
     sections[0].set_ylabel("z [mm]")
     views = [figure.add_subplot(grid[1, column], projection="3d") for column in range(len(surfaces))]
     for ax, (faces, of_face), state in zip(views, surfaces, cuboid.pictures.states, strict=True):
         draw_view(ax, faces, plt.get_cmap()(norm(of_face)))
-        ax.set_title(f"{state.time:g} s")
+        ax.set_title(f"block, {state.time:g} s")
     volume = figure.add_subplot(grid[1, 3])
     for name, body, style in (("disc", cylinder, "-"), ("block", cuboid, "--")):
         volume.plot(body.volume.time / 1000, body.ratios, "k" + style, label=name)
-    volume.set(xlabel="time [1000 s]", ylabel="volume / volume at 7000 s")
+    volume.set(title="both bodies", xlabel="time [1000 s]", ylabel="volume / volume at 7000 s")
     volume.legend()
     letter_panels([*sections, *views, volume])
-    label = f"overall pressure p [N/mm²]: {values.min():.2f} to {values.max():.2f}".replace("-", "−")
-    colours = ScalarMappable(norm)
-    figure.colorbar(
-        colours, ax=[*sections, *views], label=label, location="bottom", shrink=0.5, aspect=40, ticks=levels[::2]
-    )
+    label = f"overall pressure p [N/mm²], {values.min():.2f} to {values.max():.2f} in these pictures".replace("-", "−")
+    bar = figure.colorbar(ScalarMappable(norm), ax=[*sections, *views], location="bottom", shrink=0.6, aspect=45)
+    bar.set_ticks(list(levels), labels=[f"{level:g}".replace("-", "−") for level in levels])
+    bar.set_label(label)
     return figure
 
 
-def enclosing(values: NDArray, step: float = 0.02) -> NDArray:
-    """Levels by multiples of `step` [N/mm²] that enclose all values."""
-    first, last = np.floor(values.min() / step), np.ceil(values.max() / step)
-    return step * np.arange(first, last + 1)
+def enclosing(values: NDArray) -> NDArray:
+    """Those of `LEVELS` that enclose all values, none more."""
+    first, beyond = np.searchsorted(LEVELS, values.min(), "right") - 1, np.searchsorted(LEVELS, values.max())
+    return LEVELS[first : beyond + 1]
 
 
 def draw_section(ax: Axes, half: Picture, levels: NDArray, norm: BoundaryNorm) -> None:

@@ -255,7 +255,7 @@ class Clock:
 
 
 @dataclass(frozen=True)
-class Case:
+class ChosenSolution:
     """Fields chosen over time in their coordinates, the boundaries with area, and the bath if there is one."""
 
     chosen: Callable[[CoefficientFunction], Chosen]
@@ -353,26 +353,26 @@ def _padded(g: CoefficientFunction) -> CoefficientFunction:
 
 @dataclass(frozen=True)
 class Manufactured(Concentration):
-    """A model under test, driven by the sources of a case."""
+    """A model under test, driven by the sources of a chosen solution."""
 
-    case: Case | None = None
+    solution: ChosenSolution | None = None
 
     def terms(self, state: Any, tests: Sequence[CoefficientFunction]) -> list[Term]:
-        if self.case is None:
-            raise InputError("Manufactured needs a case")
-        return super().terms(state, tests) + self.case.sources(tests, by_potentials=False)
+        if self.solution is None:
+            raise InputError("Manufactured needs a solution")
+        return super().terms(state, tests) + self.solution.sources(tests, by_potentials=False)
 
 
 @dataclass(frozen=True)
 class ManufacturedPotential(Potential):
     """The other one."""
 
-    case: Case | None = None
+    solution: ChosenSolution | None = None
 
     def terms(self, state: Any, tests: Sequence[CoefficientFunction]) -> list[Term]:
-        if self.case is None:
-            raise InputError("ManufacturedPotential needs a case")
-        return super().terms(state, tests) + self.case.sources(tests, by_potentials=True)
+        if self.solution is None:
+            raise InputError("ManufacturedPotential needs a solution")
+        return super().terms(state, tests) + self.solution.sources(tests, by_potentials=True)
 
 
 # -- the cases ----------------------------------------------------------------------------------------------------------
@@ -497,19 +497,19 @@ def errors(
 ) -> dict[str, float]:
     """Error norms at the end of the motion. `choices` are the model's."""
     make_mesh, motion, coordinates, supports, boundaries = KINDS[kind]
-    case = Case(fields(kind, duration), coordinates, Parameters(**NUMBERS, RT=RT), boundaries, bath, true_rate)
+    solution = ChosenSolution(fields(kind, duration), coordinates, Parameters(**NUMBERS, RT=RT), boundaries, bath, true_rate)
     scene = Scene(
         mesh=make_mesh(cells),
         kinematics=motion,
         material=Material(**NUMBERS),
-        model=model(order=order, case=case, **choices),
+        model=model(order=order, solution=solution, **choices),
         supports=PINS[kind] if fields is affine else supports,
         baths=[bath] if bath else [],
         initial=(SALT, 0.0),
     )
-    case.clock.follow(scene.problem)
+    solution.clock.follow(scene.problem)
     scene.run(duration, Fixed(duration / steps))
-    return case.errors(scene.problem)
+    return solution.errors(scene.problem)
 
 
 def orders(coarse: dict[str, float], fine: dict[str, float], ratio: float) -> dict[str, float]:

@@ -14,15 +14,18 @@ Numbers, all relative unless a unit is given:
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from netgen.occ import Circle, MoveTo, OCCGeometry
 from ngsolve import Integrate, Mesh, x, y
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ngswell import (
     TABLE_1,
@@ -52,11 +55,35 @@ from ngswell.closed_forms import consolidation
 from ngswell.closed_forms.homogeneous import homogeneous_equilibrium
 from ngswell.closed_forms.linear_column import LinearColumn
 from ngswell.models.model import Model
-from ngswell.physics import donnan, laws
+from ngswell.physics import laws
 from ngswell.physics.kinematics import Kinematics
 from ngswell.setup.supports import Support
 from studies.limits.manufactured import FAST, SLOW, errors, orders
-from studies.output import Findings, cost
+from studies.output import Findings, cost, letter_panels
+from studies.scenes import BATH, COLUMN_HEIGHT, confined_column, quarter_block
+
+
+@dataclass(frozen=True)
+class Curve:
+    """Values over places, times or baths, and how they are drawn; those of one series share its name."""
+
+    series: str
+    x: ArrayLike
+    y: ArrayLike
+    style: dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """What one case of the book finds: curves, numbers, and the runs in time behind them."""
+
+    curves: list[Curve]
+    numbers: dict[str, float]
+    results: Sequence[Result] = ()
+
+
+LINE: dict[str, Any] = {"color": "k", "lw": 0.8}
+DOTS: dict[str, Any] = {"color": "k", "marker": "o", "ms": 2.5, "ls": ""}
 
 # -- homogeneous equilibria --------------------------------------------------------------------------------------------
 
@@ -84,24 +111,26 @@ def homogeneous_body(motion: str, cfc0: float, bath: float, model: Model | None 
     )
 
 
-def homogeneous(ax: Axes, quick: bool) -> dict[str, float]:
+def homogeneous(quick: bool) -> Comparison:
     """J over baths and charges: lines from the scalar equilibrium, dots from the balances."""
-    lines, dots = np.logspace(-6, np.log10(5), 60), (1e-6, 1e-3, 0.15, 5.0) if quick else np.logspace(-6, np.log10(5), 8)
-    largest = 0.0
+    baths, dots = np.logspace(-6, np.log10(5), 60), (1e-6, 1e-3, 0.15, 5.0) if quick else np.logspace(-6, np.log10(5), 8)
+    curves, largest = [], 0.0
     for motion, style in (("confined", ":"), ("plane strain", "--"), ("3-d", "-")):
-        for cfc0 in (0.2, 1.0):
-            closed = [homogeneous_equilibrium(gel(cfc0), float(c), motion).J for c in lines]
-            shade = "k" if cfc0 == 1.0 else "0.55"
-            ax.loglog(lines, closed, color=shade, ls=style, lw=1, label=motion if cfc0 == 1.0 else None)
-            for c in dots:
-                scene = homogeneous_body(motion, cfc0, float(c))
-                scene.problem.restore(scene.equilibrate())
-                J = scene.problem.state.J(scene.mesh(*(0.5,) * scene.mesh.dim))
-                ax.plot(c, J, "o", color=shade, ms=2.5)
-                largest = max(largest, abs(J / homogeneous_equilibrium(gel(cfc0), float(c), motion).J - 1))
-    ax.set(xlabel="bath [mol/l]", ylabel="J at rest", title="homogeneous swelling", ylim=(0.9, 400))
-    ax.legend(loc="upper right", title="charge 1 mol/l, grey 0.2 mol/l", title_fontsize=8)
-    return {"homogeneous_error": largest}
+        for cfc0, shade in ((0.2, "0.55"), (1.0, "k")):
+            name = f"{motion}, {cfc0:g} mol/l"
+            closed = [homogeneous_equilibrium(gel(cfc0), float(c), motion).J for c in baths]
+            curves.append(Curve(f"{name}, closed form", baths, closed, {"color": shade, "ls": style, "lw": 1}))
+            found = [at_rest(homogeneous_body(motion, cfc0, float(c))) for c in dots]
+            curves.append(Curve(name, dots, found, {**DOTS, "color": shade}))
+            exact = [homogeneous_equilibrium(gel(cfc0), float(c), motion).J for c in dots]
+            largest = max(largest, float(np.abs(np.array(found) / exact - 1).max()))
+    return Comparison(curves, {"homogeneous_error": largest})
+
+
+def at_rest(scene: Scene) -> float:
+    """J in the middle of a body at rest."""
+    scene.problem.restore(scene.equilibrate())
+    return scene.problem.state.J(scene.mesh(*(0.5,) * scene.mesh.dim))
 
 
 # -- consolidation -----------------------------------------------------------------------------------------------------
@@ -122,7 +151,11 @@ def extrapolated(scene: Scene, points: list[tuple[float, ...]], T: NDArray, step
     return (8 * runs[2] - 6 * runs[1] + runs[0]) / 3
 
 
-def terzaghi(ax: Axes, results: list[Result]) -> dict[str, float]:
+T_COLUMN = np.array([0.1, 0.2, 0.4, 0.8])
+"""Times in L²/c_v."""
+
+
+def terzaghi() -> Comparison:
     """Pressure along a column under a sudden load."""
     scene = Scene(
         mesh=column(1.0, 20),
@@ -133,20 +166,18 @@ def terzaghi(ax: Axes, results: list[Result]) -> dict[str, float]:
         baths=[Bath("top")],
         loads=[Traction("top", (-LOAD,))],
     )
-    T, heights = np.array([0.1, 0.2, 0.4, 0.8]), np.linspace(0, 0.95, 20)
+    T, heights, fine = T_COLUMN, np.linspace(0, 0.95, 20), np.linspace(0, 1, 101)
     unit = 1 / consolidation.consolidation_coefficient(DRAINED)
+    results: list[Result] = []
     found = extrapolated(scene, [(float(h),) for h in heights], T, 0.02, results)
-    fine = np.linspace(0, 1, 101)
-    errors = []
-    for column_, t in enumerate(T):
-        ax.plot(consolidation.terzaghi_pressure(DRAINED, 1.0, 1.0, fine, t * unit), fine, "k-", lw=0.8)
-        ax.plot(found[:, column_], heights, "ko", ms=2)
-        ax.annotate(f"{t:g}", (found[1, column_], 0.08), fontsize=7, ha="center", backgroundcolor="w")
-        errors.append(
-            np.abs(found[:, column_] - consolidation.terzaghi_pressure(DRAINED, 1.0, 1.0, heights, t * unit)).max()
-        )
-    ax.set(xlabel="p / load", ylabel="height / L", title="Terzaghi, at $c_v t/L^2$", xlim=(0, 1.05))
-    return {"terzaghi_error": float(max(errors))}
+    curves, differences = [], []
+    for at, t in enumerate(T):
+        series = consolidation.terzaghi_pressure(DRAINED, 1.0, 1.0, fine, t * unit)
+        curves.append(Curve(f"{t:g}, series", series, fine, LINE))
+        curves.append(Curve(f"{t:g}", found[:, at], heights, {**DOTS, "ms": 2}))
+        exact = consolidation.terzaghi_pressure(DRAINED, 1.0, 1.0, heights, t * unit)
+        differences.append(np.abs(found[:, at] - exact).max())
+    return Comparison(curves, {"terzaghi_error": float(max(differences))}, results)
 
 
 def quarter_disc(maxh: float) -> Mesh:
@@ -157,7 +188,7 @@ def quarter_disc(maxh: float) -> Mesh:
     return Mesh(OCCGeometry(face, dim=2).GenerateMesh(maxh=maxh))
 
 
-def cryer(ax: Axes, results: list[Result]) -> dict[str, float]:
+def cryer() -> Comparison:
     """Pressure at the centre of a sphere under hydrostatic load: it rises before it drains."""
     scene = Scene(
         mesh=quarter_disc(0.3).Curve(4),
@@ -168,54 +199,41 @@ def cryer(ax: Axes, results: list[Result]) -> dict[str, float]:
         baths=[Bath("surface", P=-LOAD)],  # no load and suction: the loaded, drained sphere less a uniform pressure
         initial=(None, 0.0),
     )
-    T = np.arange(1, 21) * 0.02
+    T, fine = np.arange(1, 21) * 0.02, np.linspace(0.002, 0.4, 200)
+    results: list[Result] = []
     found = 1 + extrapolated(scene, [(0.0, 0.0)], T, 0.01, results)[0]
-    fine = np.linspace(0.002, 0.4, 200)
     unit = 1 / consolidation.consolidation_coefficient(DRAINED)
     exact = consolidation.cryer_pressure(DRAINED, 1.0, 1.0, 0.0, T * unit)
-    ax.plot(fine, consolidation.cryer_pressure(DRAINED, 1.0, 1.0, 0.0, fine * unit), "k-", lw=0.8, label="series")
-    ax.plot(T, found, "ko", ms=2.5, label="computed")
-    ax.set(xlabel="$c_v t/R^2$", ylabel="p at the centre / load", title="Cryer's sphere")
-    ax.legend()
+    series = consolidation.cryer_pressure(DRAINED, 1.0, 1.0, 0.0, fine * unit)
     late = T > 0.03  # before, the steps do not resolve the boundary layer
-    return {
+    numbers = {
         "cryer_error": float(np.abs(found - exact)[late].max()),
         "cryer_overshoot": float(found.max()),
         "cryer_overshoot_series": float(exact.max()),
     }
+    return Comparison([Curve("series", fine, series, LINE), Curve("computed", T, found, DOTS)], numbers, results)
 
 
 # -- the charged column ------------------------------------------------------------------------------------------------
 
 
-def linear_column(ax: Axes, results: list[Result]) -> dict[str, float]:
+def linear_column() -> Comparison:
     """Top of Table 1's column after a bath step of 1e-5, against the series with the same time steps."""
-    bath, change, step = 0.15, 1e-5, 5.0
-    load = donnan.pressure(bath, 0.2, TABLE_1.RT)
-    tops = []
+    change, step = 1e-5, 5.0
+    tops, results = [], []
     for sign in (1, -1):
-        scene = Scene(
-            mesh=column(0.5, 20),
-            kinematics=Confined(),
-            material=TABLE_1,
-            model=Concentration(4),
-            supports=[Roller("bottom", "x")],
-            baths=[Bath("top", c=bath * (1 + sign * change), treatment=Penalty(relative=1e6))],
-            loads=[Traction("top", (-load,))],
-            initial=(bath, 0.0),
-        )
-        probe = Probe((0.5,), "displacement")
+        bath, weak = BATH * (1 + sign * change), Penalty(relative=1e6)
+        scene = confined_column(weak, bath, 20, model=Concentration(4), initial=(BATH, 0.0))
+        probe = Probe((COLUMN_HEIGHT,), "displacement")
         results.append(scene.run(600.0, Fixed(step), [probe], newton=EXACT))
         tops.append(probe.values["displacement"][1:])
         time = probe.time[1:]
     found = (tops[0] - tops[1]) / 2
-    closed = LinearColumn(TABLE_1, bath, 0.5)
-    exact = closed.top_displacement(time, salt=bath * change, step=step)
-    ax.plot(time, closed.top_displacement(time, salt=bath * change) * 1e6, "k-", lw=0.8, label="series")
-    ax.plot(time[::6], found[::6] * 1e6, "ko", ms=2.5, label="computed")
-    ax.set(xlabel="time [s]", ylabel="top [1e-6 mm]", title="charged column, small bath step")
-    ax.legend()
-    return {"linear_column_error": float(np.abs(found - exact).max() / np.abs(exact).max())}
+    closed = LinearColumn(TABLE_1, BATH, COLUMN_HEIGHT)
+    exact = closed.top_displacement(time, salt=BATH * change, step=step)
+    series = closed.top_displacement(time, salt=BATH * change)
+    curves = [Curve("series", time, series * 1e6, LINE), Curve("computed", time[::6], found[::6] * 1e6, DOTS)]
+    return Comparison(curves, {"linear_column_error": float(np.abs(found - exact).max() / np.abs(exact).max())}, results)
 
 
 # -- Donnan equilibrium of a gel that is not homogeneous ---------------------------------------------------------------
@@ -233,14 +251,7 @@ LAYERED = Material(  # even in x and y: smooth across the symmetry planes
 
 def unrest(n: int, order: int = 2) -> NDArray:
     """Deviations from uniform c₊c₋ and hydraulic pressure, and the seepage left, of a layered gel at rest (L2 norms)."""
-    scene = Scene(
-        mesh=rectangle(1.0, 1.0, n, n),
-        kinematics=PlaneStrain(),
-        material=LAYERED,
-        model=Concentration(order=order),
-        supports=[Symmetry("left"), Symmetry("bottom")],
-        baths=[Bath("top|right", c=1.0, treatment=Penalty(relative=1e3))],
-    )
+    scene = quarter_block(Penalty(relative=1e3), 1.0, n, material=LAYERED, model=Concentration(order=order))
     scene.problem.restore(scene.equilibrate())
     out = scene.problem.state.outputs()
     salt = (out["c_plus"] * out["c_minus"] - 1.0) ** 2
@@ -260,81 +271,147 @@ def printed_drive(*state_and_gradients):  # type: ignore[no-untyped-def]
 _PROPER = laws.transport
 
 
-def donnan_rest(ax: Axes) -> dict[str, float]:
+CELLS = np.array([4, 8, 16])
+"""Cells a side of the layered gel."""
+
+
+def donnan_rest() -> Comparison:
     """Orders with quadratic and cubic u, and the printed drive, which has none."""
-    cells = np.array([4, 8, 16])
-    numbers = {}
-    for order, style in ((2, "o-"), (3, "s--")):
-        errors = np.array([unrest(n, order) for n in cells])
-        ax.loglog(1 / cells, errors[:, 1], "k" + style, ms=3, lw=0.8, label=f"u of order {order}")
-        numbers[f"donnan_order_{order}"] = float(np.log2(errors[1, 0] / errors[2, 0]))
+    curves, numbers = [], {}
+    for order, marker, line in ((2, "o", "-"), (3, "s", "--")):
+        off = np.array([unrest(n, order) for n in CELLS])
+        style = {**LINE, "marker": marker, "ms": 3, "ls": line}
+        curves.append(Curve(f"u of order {order}", 1 / CELLS, off[:, 1], style))
+        numbers[f"donnan_order_{order}"] = float(np.log2(off[1, 0] / off[2, 0]))
     laws.transport = printed_drive
     try:
-        wrong = np.array([unrest(n) for n in cells])
+        wrong = np.array([unrest(n) for n in CELLS])
     finally:
         laws.transport = _PROPER
-    ax.loglog(1 / cells, wrong[:, 1], "k^:", ms=3, lw=0.8, label="(19) as printed")
+    curves.append(Curve("(19) as printed", 1 / CELLS, wrong[:, 1], {**LINE, "marker": "^", "ms": 3, "ls": ":"}))
     numbers["donnan_printed_drive"] = float(np.log2(wrong[1, 1] / wrong[2, 1]))
-    ax.set(xlabel="cell size [mm]", ylabel="|P − P$_{bath}$| / Rθ [mol/l]", title="layered gel at rest")
-    ax.set_xticks(1 / cells, [f"1/{n}" for n in cells])
-    ax.minorticks_off()
-    ax.legend(loc="center right", bbox_to_anchor=(1.0, 0.66))
-    return numbers
+    return Comparison(curves, numbers)
 
 
 # -- chosen solutions of the full system -------------------------------------------------------------------------------
 
+MEASURE = {"plane strain": 1.0, "axisymmetric": np.pi, "3-d": 1.0}
+"""Of the bodies: area [mm²] of the square, volume [mm³] of the cylinder and the cube."""
 
-def manufactured(ax: Axes) -> dict[str, float]:
-    """L2 errors of u and p against chosen fields: quadratic u in a fast motion, cubic u in a slow one."""
-    numbers = {}
-    for kind, style in (("plane strain", "-"), ("axisymmetric", "--"), ("3-d", ":")):
+
+def manufactured() -> Comparison:
+    """Errors of u and p against chosen fields: quadratic u in a fast motion, cubic u in a slow one.
+
+    The curves are root mean squares over the body [mm, N/mm²].
+    """
+    curves, numbers = [], {}
+    for kind, line in (("plane strain", "-"), ("axisymmetric", "--"), ("3-d", ":")):
         for order, duration, shade in ((2, FAST, "k"), (3, SLOW, "0.55")):
             cells = (6, 12) if kind != "3-d" else (2, 4) if order == 2 else (2, 3)
             pair = [errors(kind, order, n, duration) for n in cells]
             for name, marker in (("u", "o"), ("p", "s")):
-                sizes = [1 / n for n in cells]
-                label = f"{name}, {kind}, order {order}"
-                ax.loglog(sizes, [e[name] for e in pair], marker=marker, ls=style, color=shade, ms=3, lw=0.8, label=label)
+                style = {"marker": marker, "ls": line, "color": shade, "ms": 3, "lw": 0.8}
+                means = [e[name] / np.sqrt(MEASURE[kind]) for e in pair]
+                curves.append(Curve(f"{name}, {kind}, order {order}", [1 / n for n in cells], means, style))
             for name, order_of in orders(pair[0], pair[1], cells[1] / cells[0]).items():
                 if name in ("u", "p", "c"):
                     numbers[f"manufactured_{kind.replace(' ', '_').replace('-', '')}_order_{order}_{name}"] = order_of
-    ax.set(xlabel="cell size [mm]", ylabel="L2 error of u, p (mm, N)", title="chosen solutions")
-    ax.set_xticks([1 / 12, 1 / 6, 1 / 4, 1 / 2], ["1/12", "1/6", "1/4", "1/2"])
-    ax.minorticks_off()
-    ax.legend(
-        handles=[
-            Line2D([], [], color="k", marker="o", ms=3, ls="", label="u"),
-            Line2D([], [], color="k", marker="s", ms=3, ls="", label="p"),
-            Line2D([], [], color="k", label="order 2"),
-            Line2D([], [], color="0.55", label="order 3"),
-        ],
-        ncols=2,
-    )
-    return numbers
+    return Comparison(curves, numbers)
 
 
-CASES = ("homogeneous", "terzaghi", "cryer", "linear_column", "donnan", "manufactured")
+# -- the study ---------------------------------------------------------------------------------------------------------
 
 
 def run(quick: bool = False) -> Findings:
     """All cases; `quick` takes fewer baths."""
-    figure, axes = plt.subplots(2, 3, figsize=(10.0, 6.0))
-    results: list[Result] = []
-    numbers: dict[str, float | int | str] = {}
-    numbers |= homogeneous(axes[0, 0], quick)
-    numbers |= terzaghi(axes[0, 1], results)
-    numbers |= cryer(axes[0, 2], results)
-    numbers |= linear_column(axes[1, 0], results)
-    numbers |= donnan_rest(axes[1, 1])
-    numbers |= manufactured(axes[1, 2])
-    numbers |= {"mesh": "1 to 256 cells of order 2 to 4, by case", **cost(results)}
-    rows = [
-        (case, line.get_label(), float(a), float(b))
-        for case, ax in zip(
-            ("homogeneous", "terzaghi", "cryer", "linear_column", "donnan", "manufactured"), axes.flat, strict=True
-        )
-        for line in ax.get_lines()
-        for a, b in zip(line.get_xdata(), line.get_ydata(), strict=True)
+    found = compute(quick)
+    return Findings(draw(found), ("case", "series", "x", "y"), rows(found), numbers(found))
+
+
+def compute(quick: bool) -> dict[str, Comparison]:
+    """The cases by name."""
+    return {
+        "homogeneous": homogeneous(quick),
+        "terzaghi": terzaghi(),
+        "cryer": cryer(),
+        "linear_column": linear_column(),
+        "donnan": donnan_rest(),
+        "manufactured": manufactured(),
+    }
+
+
+def rows(found: dict[str, Comparison]) -> list[Sequence[object]]:
+    """What the figure shows."""
+    return [
+        (case, curve.series, float(a), float(b))
+        for case, comparison in found.items()
+        for curve in comparison.curves
+        for a, b in zip(np.asarray(curve.x), np.asarray(curve.y), strict=True)
     ]
-    return Findings(figure, ("case", "series", "x", "y"), rows, numbers)
+
+
+def numbers(found: dict[str, Comparison]) -> dict[str, float | int | str]:
+    """The numbers of all cases."""
+    numbers: dict[str, float | int | str] = {}
+    for comparison in found.values():
+        numbers |= comparison.numbers
+    results = [result for comparison in found.values() for result in comparison.results]
+    return numbers | {"mesh": "1 to 256 cells of order 2 to 4, by case", **cost(results)}
+
+
+# -- the figure --------------------------------------------------------------------------------------------------------
+
+
+def draw(found: dict[str, Comparison]) -> Figure:
+    """One panel a case."""
+    figure, axes = plt.subplots(2, 3, figsize=(10.0, 6.0))
+    panels = dict(zip(found, axes.flat, strict=True))
+    for case, comparison in found.items():
+        for curve in comparison.curves:
+            panels[case].plot(curve.x, curve.y, label=curve.series, **curve.style)
+    label_consolidation(panels["terzaghi"], panels["cryer"], found["terzaghi"])
+    label_equilibria(panels["homogeneous"], panels["donnan"])
+    panels["linear_column"].set(xlabel="time [s]", ylabel="top [1e-6 mm]", title="charged column, small bath step")
+    panels["linear_column"].legend()
+    label_manufactured(panels["manufactured"])
+    letter_panels(panels.values())
+    return figure
+
+
+def label_consolidation(column: Axes, sphere: Axes, terzaghi: Comparison) -> None:
+    """Terzaghi's column, with the time beside each curve, and Cryer's sphere."""
+    for curve, t in zip(terzaghi.curves[1::2], T_COLUMN, strict=True):
+        column.annotate(f"{t:g}", (np.asarray(curve.x)[1], 0.05), (5, 0), textcoords="offset points", fontsize=7)
+    column.set(xlabel="p / load", ylabel="height / L", title="Terzaghi, at $c_v t/L^2$", xlim=(0, 1.05))
+    sphere.set(xlabel="$c_v t/R^2$", ylabel="p at the centre / load", title="Cryer's sphere")
+    sphere.legend()
+
+
+def label_equilibria(homogeneous: Axes, layered: Axes) -> None:
+    """Homogeneous bodies over their baths, and the layered gel over its cells."""
+    homogeneous.set(xscale="log", yscale="log", ylim=(0.9, 400))
+    homogeneous.set(xlabel="bath [mol/l]", ylabel="J at rest", title="homogeneous swelling")
+    styles = (("confined", ":"), ("plane strain", "--"), ("3-d", "-"))
+    motions = [Line2D([], [], color="k", ls=line, lw=1, label=motion) for motion, line in styles]
+    homogeneous.legend(handles=motions, loc="upper right", title="charge 1 mol/l, grey 0.2 mol/l", title_fontsize=8)
+    layered.set(xscale="log", yscale="log", title="layered gel at rest")
+    layered.set(xlabel="cell size [mm]", ylabel="|P − P$_{bath}$| / Rθ [mol/l]")
+    layered.set_xticks(1 / CELLS, [f"1/{n}" for n in CELLS])
+    layered.minorticks_off()
+    layered.legend(loc="center right", bbox_to_anchor=(1.0, 0.66))
+
+
+def label_manufactured(ax: Axes) -> None:
+    """Chosen solutions over the cell size."""
+    ax.set(xscale="log", yscale="log", title="chosen solutions")
+    ax.set(xlabel="cell size [mm]", ylabel="rms error of u [mm], p [N/mm²]")
+    ax.set_xticks([1 / 12, 1 / 6, 1 / 4, 1 / 2], ["1/12", "1/6", "1/4", "1/2"])
+    ax.minorticks_off()
+    ax.set_ylim(1e-10, None)
+    handles = [
+        Line2D([], [], color="k", marker=marker, ms=3, ls="", label=name) for name, marker in (("u", "o"), ("p", "s"))
+    ]
+    handles += [Line2D([], [], color=shade, label=f"order {order}") for order, shade in ((2, "k"), (3, "0.55"))]
+    motions = (("plane strain", "-"), ("axisymmetric", "--"), ("3-d", ":"))
+    handles += [Line2D([], [], color="k", lw=0.8, ls=line, label=motion) for motion, line in motions]
+    ax.legend(handles=handles, ncols=2, loc="lower right")

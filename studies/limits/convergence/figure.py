@@ -59,7 +59,7 @@ def draw_softening(axes: Axes, closed: dict[str, float], softenings: Sequence[So
     axes.set_ylim(top=1.3)
     mark(axes, closed["biot_critical_J"], "incompressible")
     mark(axes, closed["solid_critical_J"], "solid alone")
-    axes.legend(fontsize=6.5, loc="lower left")
+    axes.legend(fontsize=6.5, loc="lower left", frameon=True, framealpha=1.0, facecolor="w", edgecolor="none")
 
 
 def draw_growth(axes: Axes, closed: dict[str, float], growths: Sequence[Growth]) -> None:
