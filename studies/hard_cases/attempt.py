@@ -66,6 +66,13 @@ class Attempt:
     message: str = ""
     warnings: tuple[str, ...] = ()
 
+    @property
+    def over_bound(self) -> float:
+        """Error over bound of an attempt that passes; a bound of zero is met by zero alone."""
+        assert self.error is not None
+        assert self.bound is not None
+        return self.error / self.bound if self.bound else float(self.error > 0)
+
 
 def attempt(
     case: str,
@@ -102,11 +109,7 @@ def attempt(
         except NgswellError as refused:
             return Attempt(case, variant, "refused", measure, message=str(refused))
     found, open_by = float(error(scene, result)), max(ledger.imbalance().values())
-    fault = unusable(scene, until)
-    if not found <= bound:
-        fault = fault or f"error {found:.3g} above {bound:.3g}"
-    if not open_by <= ledger_bound:
-        fault = fault or f"the ledger is open by {open_by:.3g}"
+    fault = unusable(scene, until) or missed(found, bound, open_by, ledger_bound)
     return Attempt(
         case,
         variant,
@@ -123,6 +126,13 @@ def attempt(
         fault,
         tuple(dict.fromkeys(str(warning.message) for warning in caught)),
     )
+
+
+def missed(error: float, bound: float, imbalance: float, ledger_bound: float) -> str:
+    """Which bound a run does not meet; empty if it meets both."""
+    if not error <= bound:
+        return f"error {error:.3g} above {bound:.3g}"
+    return "" if imbalance <= ledger_bound else f"the ledger is open by {imbalance:.3g}"
 
 
 def unusable(scene: Scene, time: float) -> str:

@@ -215,7 +215,7 @@ def wrinkles(quick: bool) -> list[Attempt]:
 
 
 @dataclass(frozen=True)
-class Course:
+class SurfaceHistory:
     """One run of the skinned layer: times [s], J at half height, the seed's amplitude [mm], the last surface [mm]."""
 
     name: str
@@ -226,17 +226,17 @@ class Course:
     surface: NDArray
 
 
-def series(quick: bool) -> list[Course]:
+def series(quick: bool) -> list[SurfaceHistory]:
     """What a figure shows: the seeded skin on all meshes, followed; and what runs without a watch make of it."""
     runs: list[tuple[str, tuple[int, int], float, Control]] = [
         (f"{nx} × {ny}", (nx, ny), 1e-2, FOLLOWING) for nx, ny in CELLS[: 2 if quick else 3]
     ]
     runs += [("seed, steps of 100 s", CELLS[0], 1e-2, HIDING), ("no seed", CELLS[0], 0.0, FOLLOWING)]
-    courses = []
+    histories = []
     for name, cells, seed, steps in runs:
         scene, surface = SKINNED.scene(cells, seed), Surface(SKINNED)
         probe = Probe((SKINNED.width / 2, HEIGHT / 2), "J")
         scene.run(SKINNED.until, steps, [surface, probe], resume=scene.equilibrate())
         amplitude = surface.amplitudes[:, SKINNED.waves]
-        courses.append(Course(name, surface.time, probe.values["J"], amplitude, surface.x, surface.profiles[-1]))
-    return courses
+        histories.append(SurfaceHistory(name, surface.time, probe.values["J"], amplitude, surface.x, surface.profiles[-1]))
+    return histories

@@ -11,7 +11,6 @@ from ngswell import (
     TABLE_2,
     Adaptive,
     Area,
-    Bath,
     Concentration,
     Essential,
     Ledger,
@@ -19,18 +18,15 @@ from ngswell import (
     Newton,
     Nitsche,
     Penalty,
-    PlaneStrain,
     Potential,
     Probe,
     Ramp,
-    Scene,
     StepError,
-    Symmetry,
-    rectangle,
 )
 from ngswell.closed_forms.homogeneous import homogeneous_equilibrium
 from ngswell.models import concentration
 from ngswell.problem.problem import Snapshot
+from studies.hard_cases.bodies import block_scene
 
 CHOICES = {
     "Concentration": (Concentration(), None),
@@ -59,24 +55,11 @@ def test_column(choice, end, until_diluted):
     assert len(result.steps) < 150  # 60 to 80
 
 
-def block(model, treatment, c):
-    """A quarter of a square of Table 2, which starts swollen in 1 mol/l."""
-    return Scene(
-        mesh=rectangle(1.0, 1.0, 4, 4),
-        kinematics=PlaneStrain(),
-        material=TABLE_2,
-        model=model,
-        supports=[Symmetry("left"), Symmetry("bottom")],
-        baths=[Bath("top|right", c=c, treatment=treatment)],
-        initial=(1.0, 0.0),
-    )
-
-
 def diluted_area(choice, end, duration, until):
     """Areas over time, of the block at rest in 1 mol/l whose bath goes to `end` within `duration` [s]."""
     model, treatment = CHOICES[choice]
-    swollen = Snapshot(0.0, block(model, treatment, 1.0).equilibrate().values)
-    scene, area = block(model, treatment, Ramp((0, 1.0), (duration, end)) if duration else end), Area()
+    swollen = Snapshot(0.0, block_scene(model, treatment, 1.0, 4).equilibrate().values)
+    scene, area = block_scene(model, treatment, Ramp((0, 1.0), (duration, end)) if duration else end, 4), Area()
     scene.run(until, Adaptive(1e-4), [area], resume=swollen, newton=Newton())
     return area.values
 

@@ -1,4 +1,4 @@
-"""Hard cases of ions, time and contrasts at a small size, and what their bounds rest on (`studies/hard_cases/ions.py`)."""
+"""Hard cases of ions, time and contrasts at a small size, and what their bounds rest on (`studies/hard_cases/`)."""
 
 import numpy as np
 import pytest
@@ -7,24 +7,16 @@ from ngswell import TABLE_1, Adaptive, Fixed, Ledger, Newton, Penalty, Probe, Ra
 from ngswell.closed_forms.linear_column import LinearColumn, conductance
 from ngswell.stepping.stepper import _following
 from studies.hard_cases.attempt import CHOICES
-from studies.hard_cases.ions import (
-    BATH,
-    CELLS,
-    CHARGED,
-    COUNT,
-    FAMILIES,
-    HEIGHT,
-    allowed,
-    alternating,
-    alternation,
-    column_scene,
-    followed,
-    layered,
-    linear_column,
-    penalised_efflux,
-    relaxed,
-    skin,
-)
+from studies.hard_cases.baths import bath_range, penalised_efflux, penalties, relaxed
+from studies.hard_cases.bodies import CELLS, column_scene
+from studies.hard_cases.charge import CHARGED, charge
+from studies.hard_cases.contrasts import contrasts, layered, skin
+from studies.hard_cases.linear import COUNT, followed, linear_column
+from studies.hard_cases.time import allowed, alternating, alternation, cycles, sudden_steps
+from studies.scenes import BATH
+from studies.scenes import COLUMN_HEIGHT as HEIGHT
+
+FAMILIES = (bath_range, charge, sudden_steps, contrasts, penalties, cycles)
 
 
 @pytest.mark.parametrize("family", FAMILIES, ids=lambda family: family.__name__)
