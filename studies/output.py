@@ -74,12 +74,12 @@ def cost(results: Sequence[Result]) -> dict[str, float | int]:
     }
 
 
-def letter_panels(panels: Iterable[Axes]) -> None:
-    """Put (a), (b), ... before the titles of the panels, all of them flush left; call it when the titles are set."""
+def letter_panels(panels: Iterable[Axes], pad: float | None = None) -> None:
+    """Put (a), (b), ... before the titles of the panels, all of them flush left, `pad` points above; call it last."""
     for letter, ax in zip(ascii_lowercase, panels, strict=False):
         title = ax.get_title("left") or ax.get_title("center")
         ax.set_title("")
-        ax.set_title(f"({letter}) {title}".rstrip(), loc="left")
+        ax.set_title(f"({letter}) {title}".rstrip(), loc="left", pad=pad)
 
 
 def _versions() -> dict[str, str]:

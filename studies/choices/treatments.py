@@ -75,8 +75,20 @@ from ngswell.observers.base import Observer
 from ngswell.physics import donnan
 from ngswell.problem.problem import Problem, Snapshot
 from ngswell.stepping.stepper import StepReport
-from studies.output import Findings, cost
-from studies.paper import boundary_charge, free_swelling, oscillation
+from studies.output import Findings, cost, letter_panels
+from studies.paper.oscillation import STEP
+from studies.scenes import (
+    COLUMN_HEIGHT,
+    FALLING,
+    HEIGHT,
+    INITIAL,
+    WIDTH,
+    confined_column,
+    free_swelling_block,
+    strip,
+    with_model,
+    with_treatment,
+)
 
 DECADES = (1e-2, 1e-1, 1.0, 1e1, 1e2, 1e4, 1e6, 1e9, 1e12)
 QUICK_DECADES = (1e-1, 1e4)
@@ -157,7 +169,7 @@ class Patience(Observer):
 
 
 @dataclass(frozen=True)
-class Case:
+class ComparedScene:
     """A scene on meshes from coarse to fine, its steps, and what is compared."""
 
     name: str
@@ -172,8 +184,7 @@ class Case:
     begin: Callable[[Scene], Snapshot] | None = None
 
     def with_(self, mesh: Mesh, model: Model, treatment: Treatment) -> Scene:
-        scene = self.scene(mesh)
-        return replace(scene, model=model, baths=[replace(bath, treatment=treatment) for bath in scene.baths])
+        return with_model(self.scene(mesh), model, treatment)
 
 
 @dataclass(frozen=True)
@@ -190,14 +201,13 @@ class Outcome:
 def at_rest(scene: Scene) -> Snapshot:
     """The block at 7000 s. A homogeneous state, the same for every treatment, without effluxes."""
     treatment = Essential() if isinstance(scene.model, Potential) else Penalty(relative=1e4)
-    twin = replace(scene, baths=[replace(bath, treatment=treatment) for bath in scene.baths])
-    rest = twin.equilibrate(free_swelling.INITIAL)
+    rest = with_treatment(scene, treatment).equilibrate(INITIAL)
     values = np.zeros(scene.problem.vector.size)
     values[: rest.values.size] = rest.values
     return Snapshot(rest.time, values)
 
 
-def execute(case: Case, scene: Scene, watch_condition: bool = True) -> Outcome:
+def execute(case: ComparedScene, scene: Scene, watch_condition: bool = True) -> Outcome:
     """Run a scene to the case's end, or to where it fails."""
     watched, condition = case.observer(), Condition()
     observers = [watched, Patience(), *([condition] if watch_condition else [])]
@@ -215,51 +225,61 @@ def top(probe: Probe) -> NDArray:
     return values if values.ndim == 1 else values[:, -1]
 
 
-def cases(quick: bool) -> list[Case]:
+def compared_column(cells: tuple[int, ...], until: float) -> ComparedScene:
+    """The column of Fig. 4."""
+    return ComparedScene(
+        "column", lambda mesh: confined_column(c=FALLING, mesh=mesh),
+        tuple(column(COLUMN_HEIGHT, n) for n in cells), graded_column, tuple(f"{n}" for n in cells), 2.5, until,
+        lambda: Probe((COLUMN_HEIGHT,), "displacement"), top,
+    )  # fmt: skip
+
+
+def compared_strip(cells: tuple[int, ...], until: float) -> ComparedScene:
+    """The strip of Fig. 8 under the bath of Fig. 4."""
+    return ComparedScene(
+        "strip", lambda mesh: strip(c=FALLING, mesh=mesh),
+        tuple(rectangle(0.02, COLUMN_HEIGHT, 1, n) for n in cells), graded_column, tuple(f"1 x {n}" for n in cells),
+        2.5, until, lambda: Probe((0.0, COLUMN_HEIGHT), "displacement"), top,
+    )  # fmt: skip
+
+
+def compared_block(cells: tuple[int, ...], reference: int, step: float, until: float) -> ComparedScene:
+    """The free-swelling block from rest; its reference has `reference` cells a side."""
+
+    def graded(coarsening: float) -> Mesh:
+        n = round(reference / coarsening)
+        return rectangle(WIDTH, HEIGHT, n, n, grade={"top": 6, "left": 6, "bottom": 6})
+
+    return ComparedScene(
+        "block", lambda mesh: free_swelling_block(1, 1, mesh=mesh),
+        tuple(rectangle(WIDTH, HEIGHT, n, n) for n in cells), graded, tuple(f"{n} x {n}" for n in cells), step, until,
+        Area, lambda area: area.values, at_rest,
+    )  # fmt: skip
+
+
+def graded_column(coarsening: float) -> Mesh:
+    return column(COLUMN_HEIGHT, round(60 / coarsening), grade={"top": 10})
+
+
+def compared_scenes(quick: bool) -> list[ComparedScene]:
     """The three scenes on three meshes each."""
-    columns, column_end = ((6, 8, 12), 25.0) if quick else ((15, 30, 60), 60.0)
-    blocks, block_step, block_end = ((3, 4, 6), 16.0, 7100.0) if quick else ((6, 11, 22), 8.0, 7224.0)
-
-    def strip(mesh: Mesh) -> Scene:
-        scene = oscillation.scene(Penalty(1.0))
-        return replace(scene, mesh=mesh, baths=[replace(bath, c=boundary_charge.BATH) for bath in scene.baths])
-
-    def graded_column(coarsening: float) -> Mesh:
-        return column(0.5, round(60 / coarsening), grade={"top": 10})
-
-    def graded_block(coarsening: float) -> Mesh:
-        n = round((6 if quick else 20) / coarsening)
-        return rectangle(free_swelling.WIDTH, free_swelling.HEIGHT, n, n, grade={"top": 6, "left": 6, "bottom": 6})
-
-    return [
-        Case(
-            "column", lambda mesh: replace(boundary_charge.scene(Penalty(1.0), 1), mesh=mesh),
-            tuple(column(0.5, n) for n in columns), graded_column, tuple(f"{n}" for n in columns), 2.5, column_end,
-            lambda: Probe((0.5,), "displacement"), top,
-        ),
-        Case(
-            "strip", strip,
-            tuple(rectangle(0.02, 0.5, 1, n) for n in columns), graded_column, tuple(f"1 x {n}" for n in columns),
-            2.5, column_end, lambda: Probe((0.0, 0.5), "displacement"), top,
-        ),
-        Case(
-            "block", lambda mesh: replace(free_swelling.scene(1, 1), mesh=mesh),
-            tuple(rectangle(free_swelling.WIDTH, free_swelling.HEIGHT, n, n) for n in blocks), graded_block,
-            tuple(f"{n} x {n}" for n in blocks), block_step, block_end, Area, lambda area: area.values, at_rest,
-        ),
-    ]  # fmt: skip
+    if quick:
+        lines, end, block = (6, 8, 12), 25.0, compared_block((3, 4, 6), 6, 16.0, 7100.0)
+    else:
+        lines, end, block = (15, 30, 60), 60.0, compared_block((6, 11, 22), 20, 8.0, 7224.0)
+    return [compared_column(lines, end), compared_strip(lines, end), block]
 
 
-def reference(case: Case, coarsening: float = 1.0) -> Outcome:
+def reference(case: ComparedScene, coarsening: float = 1.0) -> Outcome:
     """The potential model of order 3 on a graded mesh. The strip's is the column: nothing varies across it."""
-    model = Potential(order=3)
     if case.name == "strip":
-        case = replace(case, scene=lambda mesh: replace(boundary_charge.scene(Penalty(1.0), 1), mesh=mesh),
-                       observer=lambda: Probe((0.5,), "displacement"))  # fmt: skip
+        alike = compared_column((), case.until)
+        case = replace(case, scene=alike.scene, observer=alike.observer)
+    model = Potential(order=3)
     return execute(case, case.with_(case.reference(coarsening), model, Essential()), watch_condition=False)
 
 
-def distance(outcome: Outcome, exact: Outcome, case: Case) -> float:
+def distance(outcome: Outcome, exact: Outcome, case: ComparedScene) -> float:
     """Largest difference to the reference over its times, in units of the last displacement or the first area."""
     size = exact.series[0] if case.name == "block" else exact.series[-1]
     difference = np.interp(exact.time, outcome.time, outcome.series) - exact.series
@@ -268,9 +288,7 @@ def distance(outcome: Outcome, exact: Outcome, case: Case) -> float:
 
 def growth(choice: Choice, value: float | None) -> float:
     """|growth| of one step of the strip of Fig. 8 at rest."""
-    scene = oscillation.scene(Penalty(1.0))
-    baths = [replace(bath, treatment=choice.make(value)) for bath in scene.baths]
-    return abs(growth_factor(replace(scene, model=choice.model, baths=baths), oscillation.STEP).factor)
+    return abs(growth_factor(strip(choice.make(value), model=choice.model), STEP).factor)
 
 
 @dataclass(frozen=True)
@@ -289,7 +307,7 @@ class Row:
     failed: float | None
 
 
-def row(case: Case, cells: str, name: str, value: float | None, outcome: Outcome, exact: Outcome) -> Row:
+def row(case: ComparedScene, cells: str, name: str, value: float | None, outcome: Outcome, exact: Outcome) -> Row:
     done = outcome.result
     if done is None:
         return Row(case.name, cells, name, value, np.nan, np.nan, 0, 0, np.nan, outcome.failed)
@@ -297,55 +315,63 @@ def row(case: Case, cells: str, name: str, value: float | None, outcome: Outcome
     return Row(case.name, cells, name, value, error, outcome.condition, done.iterations, done.rejections, seconds, None)
 
 
+@dataclass(frozen=True)
+class Survey:
+    """All runs of all scenes; the references' own errors; |growth| of each treatment and value on the strip."""
+
+    scenes: list[ComparedScene]
+    rows: list[Row]
+    results: list[Result]
+    reference_errors: dict[str, float]
+    growths: dict[tuple[str, float | None], float]
+
+
 def run(quick: bool = False) -> Findings:
     """All of them."""
-    numbers: dict[str, float | int | str] = {}
-    rows: list[Row] = []
-    results: list[Result] = []
-    scenes = cases(quick)
-    for case in scenes:
-        exact = reference(case)
-        numbers[f"{case.name}_reference_error"] = distance(reference(case, COARSENING), exact, case)
-        for cells, mesh in zip(case.cells, case.meshes, strict=True):
-            runs = [(name, choice, value) for name, choice in CHOICES.items() for value in choice.over(quick)]
-            for name, choice, value in tqdm(runs, desc=f"{case.name} {cells}", leave=False, disable=not sys.stderr.isatty()):
-                outcome = execute(case, case.with_(mesh, choice.model, choice.make(value)))
-                results += [outcome.result] if outcome.result else []
-                rows.append(row(case, cells, name, value, outcome, exact))
-            failures = sum(r.failed is not None for r in rows if (r.case, r.mesh) == (case.name, cells))
-            print(f"treatments {case.name} {cells}: {len(runs)} runs, {failures} fail", file=sys.stderr, flush=True)
-    growths = {(name, value): growth(choice, value) for name, choice in CHOICES.items() for value in choice.over(quick)}
-
-    for case in scenes:
-        for name in CHOICES:
-            numbers |= summary(case, name, [r for r in rows if (r.case, r.treatment) == (case.name, name)])
-    for name in CHOICES:
-        numbers[f"strip_{key(name)}_growth"] = max(size for (of, _), size in growths.items() if of == name)
-    numbers |= paper_in_natural_units()
-    numbers |= {"mesh": "; ".join(f"{case.name} {', '.join(case.cells)}" for case in scenes), **cost(results)}
-
-    header = (
-        "scene",
-        "mesh",
-        "treatment",
-        "value",
-        "error",
-        "condition",
-        "iterations",
-        "rejected",
-        "seconds",
-        "growth",
-        "outcome",
-    )
+    survey = compute(quick)
+    header = ("scene", "mesh", "treatment", "value", "error", "condition", "iterations", "rejected", "seconds", "growth",
+              "outcome")  # fmt: skip
     table = [
         (
             r.case, r.mesh, r.treatment, blank(r.value), blank(r.error), blank(r.condition), r.iterations, r.rejected,
-            blank(r.seconds), growths[r.treatment, r.value] if r.case == "strip" else "",
+            blank(r.seconds), survey.growths[r.treatment, r.value] if r.case == "strip" else "",
             "passes" if r.failed is None else f"fails at {r.failed:.6g} s",
         )
-        for r in rows
+        for r in survey.rows
     ]  # fmt: skip
-    return Findings(draw(scenes, rows), header, table, numbers)
+    return Findings(draw(survey.scenes, survey.rows), header, table, numbers(survey))
+
+
+def compute(quick: bool) -> Survey:
+    """Every scene on every mesh with every treatment and value."""
+    scenes = compared_scenes(quick)
+    variants = [(name, choice, value) for name, choice in CHOICES.items() for value in choice.over(quick)]
+    survey = Survey(scenes, [], [], {}, {})
+    for case in scenes:
+        exact = reference(case)
+        survey.reference_errors[case.name] = distance(reference(case, COARSENING), exact, case)
+        for cells, mesh in zip(case.cells, case.meshes, strict=True):
+            runs = tqdm(variants, desc=f"{case.name} {cells}", leave=False, disable=not sys.stderr.isatty())
+            outcomes = [(n, v, execute(case, case.with_(mesh, choice.model, choice.make(v)))) for n, choice, v in runs]
+            survey.results.extend(outcome.result for _, _, outcome in outcomes if outcome.result)
+            survey.rows.extend(row(case, cells, name, value, outcome, exact) for name, value, outcome in outcomes)
+            failures = sum(outcome.failed is not None for _, _, outcome in outcomes)
+            print(f"treatments {case.name} {cells}: {len(outcomes)} runs, {failures} fail", file=sys.stderr, flush=True)
+    survey.growths.update({(name, value): growth(choice, value) for name, choice, value in variants})
+    return survey
+
+
+def numbers(survey: Survey) -> dict[str, float | int | str]:
+    """What the runs say, a treatment and a scene at a time."""
+    found: dict[str, float | int | str] = {f"{n}_reference_error": error for n, error in survey.reference_errors.items()}
+    for case in survey.scenes:
+        for name in CHOICES:
+            found |= summary(case, name, [r for r in survey.rows if (r.case, r.treatment) == (case.name, name)])
+    for name in CHOICES:
+        found[f"strip_{key(name)}_growth"] = max(size for (of, _), size in survey.growths.items() if of == name)
+    found |= paper_in_natural_units()
+    mesh = "; ".join(f"{case.name} {', '.join(case.cells)}" for case in survey.scenes)
+    return found | {"mesh": mesh, **cost(survey.results)}
 
 
 def blank(value: float | None) -> float | str:
@@ -356,7 +382,7 @@ def key(name: str) -> str:
     return name.replace(" ", "_")
 
 
-def summary(case: Case, name: str, rows: list[Row]) -> dict[str, float | int]:
+def summary(case: ComparedScene, name: str, rows: list[Row]) -> dict[str, float | int]:
     """What the rows of one treatment in one scene say."""
     prefix = f"{case.name}_{key(name)}"
     found: dict[str, float | int] = {f"{prefix}_failures": sum(r.failed is not None for r in rows)}
@@ -376,7 +402,7 @@ def summary(case: Case, name: str, rows: list[Row]) -> dict[str, float | int]:
 
 def paper_in_natural_units() -> dict[str, float]:
     """ε = 1 and 40 on the paper's meshes: h = 1/60 mm and 0.05 mm."""
-    of = {"strip": (1.0, 0.5 / 30, TABLE_1), "block": (40.0, free_swelling.HEIGHT / 20, TABLE_2)}
+    of = {"strip": (1.0, 0.5 / 30, TABLE_1), "block": (40.0, HEIGHT / 20, TABLE_2)}
     numbers = {}
     for name, (epsilon, h, material) in of.items():
         numbers[f"{name}_paper_over_K_h"] = epsilon * h / material.number("K")
@@ -384,7 +410,7 @@ def paper_in_natural_units() -> dict[str, float]:
     return numbers
 
 
-# Line and marker of each family, and marker of each treatment without parameter.
+# Line and marker of each family, and open marker of each treatment without parameter.
 STYLES = {
     "penalty": ("k", "-", "o"), "nitsche": ("k", "--", "s"), "nitsche skew": ("0.5", "--", "^"),
     "nitsche without adjoint": ("0.5", ":", "v"), "potential penalty": ("0.5", "-", "D"),
@@ -400,16 +426,16 @@ BESIDE = 1e14
 """Where on the axis of ε the treatments without parameter stand."""
 
 
-def draw(scenes: Sequence[Case], rows: Sequence[Row]) -> Figure:
+def draw(scenes: Sequence[ComparedScene], rows: Sequence[Row]) -> Figure:
     """Error over the penalty on the middle mesh, and error over seconds on all meshes with ε, γ on the plateau."""
-    figure, grid = plt.subplots(2, 3, figsize=(9.6, 7.6))
+    figure, grid = plt.subplots(2, 3, figsize=(9.8, 7.8))
     for column_, case in enumerate(scenes):
         mine = [r for r in rows if r.case == case.name]
         over_value, over_seconds = grid[0, column_], grid[1, column_]
         draw_sweeps(over_value, [r for r in mine if r.mesh == case.cells[1]])
         over_value.set(title=f"{case.name}, {case.cells[1]} cells", xlabel="ε or γ [K/h and D₊/h]")
         draw_costs(over_seconds, mine)
-        over_seconds.set(xlabel="seconds of the time loop", title=f"{case.name}, ε, γ = 1e4, three meshes")
+        over_seconds.set(xlabel="time loop [s], single runs", title=f"{case.name}, ε, γ = 1e4, three meshes")
     for axes in grid.flat:
         axes.xaxis.set_minor_formatter(NullFormatter())
         axes.yaxis.set_minor_formatter(NullFormatter())
@@ -417,12 +443,16 @@ def draw(scenes: Sequence[Case], rows: Sequence[Row]) -> Figure:
         axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
         axes.xaxis.set_major_formatter(ScalarFormatter())
     for axes in grid[:, 0]:
-        axes.set_ylabel("largest relative error")
+        axes.set_ylabel("largest relative error [-]")
+    for axes in grid[:, 2]:  # within a decade or two
+        axes.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+        axes.yaxis.set_major_formatter(ScalarFormatter())
+    letter_panels(grid.flat, pad=8)  # above the marks on the upper edge
     handles = [
         Line2D([], [], color=colour, ls=line, marker=marker, ms=4, lw=1, label=name)
         for name, (colour, line, marker) in STYLES.items()
     ]
-    handles += [Line2D([], [], color="k", ls="", marker=marker, ms=5, label=name) for name, marker in MARKS.items()]
+    handles += [Line2D([], [], color="k", mfc="w", ls="", marker=marker, ms=5, label=name) for name, marker in MARKS.items()]
     figure.legend(handles=handles, loc="outside lower center", ncols=4, fontsize=7.5)
     return figure
 
@@ -439,7 +469,7 @@ def draw_sweeps(axes: Axes, rows: Sequence[Row]) -> None:
         if r.treatment in MARKS:
             place = BESIDE * 4.0 ** list(MARKS).index(r.treatment)
             if r.failed is None:
-                axes.loglog(place, r.error, "k", marker=MARKS[r.treatment], ls="", ms=5)
+                axes.loglog(place, r.error, "k", mfc="w", marker=MARKS[r.treatment], ls="", ms=5)
             else:
                 draw_failures(axes, [place], "k", MARKS[r.treatment])
     axes.axvline(BESIDE / 10, color="0.7", lw=0.8)
@@ -456,11 +486,11 @@ def draw_failures(axes: Axes, values: Sequence[float], colour: str, marker: str)
 
 
 def draw_costs(axes: Axes, rows: Sequence[Row]) -> None:
-    """Each treatment from mesh to mesh, on its plateau."""
+    """Each treatment on each mesh, on its plateau. Single runs on a shared machine: points, not lines."""
     for name in CHOICES:
         mine = [r for r in rows if r.treatment == name and r.value in (None, ON_PLATEAU) and r.failed is None]
-        colour, line, marker = STYLES.get(name, ("k", ":", MARKS.get(name, "")))
+        colour, _, marker = STYLES.get(name, ("k", "", MARKS.get(name, "")))
+        fill = colour if name in STYLES else "w"
         if mine:
-            axes.loglog(
-                [r.seconds for r in mine], [r.error for r in mine], color=colour, ls=line, marker=marker, ms=4, lw=0.8
-            )
+            seconds, errors = [r.seconds for r in mine], [r.error for r in mine]
+            axes.loglog(seconds, errors, ls="", color=colour, mfc=fill, marker=marker, ms=4.5)
