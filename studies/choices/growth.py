@@ -29,7 +29,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from multiprocessing import get_context
 from statistics import median
 from time import perf_counter
@@ -49,13 +49,12 @@ from ngswell.problem.problem import Problem
 from ngswell.solve.direct import LinearSolver, best_solver
 from ngswell.solve.two_level import TwoLevelSolver, gmres, units
 from studies.limits import cylinder
-from studies.output import Findings
-from studies.paper import free_swelling
-from studies.paper.free_swelling import INITIAL, SIDE, WIDTH
+from studies.output import Findings, letter_panels
+from studies.scenes import INITIAL, SIDE, WIDTH, free_swelling_block, with_model
 
-CELLS = {2: (10, 20, 40, 80, 160, 320, 480), 3: (3, 4, 6, 8, 11, 14, 17, 24, 32)}
+CELLS: dict[int, tuple[int, ...]] = {2: (10, 20, 40, 80, 160, 320, 480), 3: (3, 4, 6, 8, 11, 14, 17, 24, 32)}
 """Cells along the height (2-d) or each edge (3-d)."""
-QUICK_CELLS = {2: (10, 20, 40), 3: (3, 4, 6)}
+QUICK_CELLS: dict[int, tuple[int, ...]] = {2: (10, 20, 40), 3: (3, 4, 6)}
 STEP = 10.0  # s
 STEPS = (100.0, 10.0, 1.0, 0.1)  # s, from easy to hard
 TRIED = 11
@@ -111,9 +110,9 @@ class Size:
 def body(dimension: int, cells: int) -> Scene:
     """The block in plane strain, or the eighth of one in space; swollen at the start, exact baths."""
     if dimension == 3:
-        return free_swelling.remodelled(cylinder.block(cells), Potential())
-    scene = free_swelling.scene(round(WIDTH * cells), cells)
-    return replace(free_swelling.remodelled(scene, Potential()), charge=Ramp((0, 1.0)), start=INITIAL)
+        return with_model(cylinder.block(cells), Potential())
+    scene = free_swelling_block(round(WIDTH * cells), cells, charge=Ramp((0, 1.0)), start=INITIAL)
+    return with_model(scene, Potential())
 
 
 def swell(problem: Problem) -> None:
@@ -278,26 +277,16 @@ def exponent(sizes: Sequence[Size], part: str) -> float:
     return slope(upper, [max(float(getattr(s, part)), 1e-9) for s in upper])
 
 
+COLUMNS = ("dimension", "solver", "cells", "unknowns", *TIMES, "iterations", "assembly_bytes", "factor_bytes", "peak_bytes")
+
+
 def run(quick: bool = False) -> Findings:
     """All solvers in both dimensions."""
     direct = best_solver()
-    names = [direct, *(["umfpack"] if direct != "umfpack" else []), "two-level"]
-    grown: dict[int, dict[str, list[Size]]] = {}
-    for dimension, cells in (QUICK_CELLS if quick else CELLS).items():
-        grown[dimension] = {
-            name: series(dimension, name, cells, LONGEST[name if name in LONGEST and name != direct else "direct"])
-            for name in names
-        }
-    numbers: dict[str, float | int | str] = {}
-    for dimension, by_name in grown.items():
-        numbers |= of_direct(f"{dimension}d", by_name[direct])
-        numbers |= of_two_level(f"{dimension}d", by_name["two-level"], by_name[direct])
-        if direct != "umfpack":
-            numbers |= of_umfpack(f"{dimension}d", by_name["umfpack"], by_name[direct])
-    numbers |= of_steps(grown[3]["two-level"], grown[3][direct])
+    grown = compute(QUICK_CELLS if quick else CELLS, direct)
     sizes = [size for by_name in grown.values() for one in by_name.values() for size in one]
     largest = {d: max(size.cells for size in sizes if size.dimension == d) for d in grown}
-    numbers |= {
+    found = numbers(grown, direct) | {
         "mesh": f"up to {round(WIDTH * largest[2])} x {largest[2]} quadrilaterals, {largest[3]}^3 hexahedra, order 2",
         "memory_gib": machine_memory() / 2**30,
         "steps": 0,
@@ -305,19 +294,26 @@ def run(quick: bool = False) -> Findings:
         "newton_iterations": sum(size.systems for size in sizes),
         "seconds": round(sum(size.seconds for size in sizes), 2),
     }
-    columns = (
-        "dimension",
-        "solver",
-        "cells",
-        "unknowns",
-        *TIMES,
-        "iterations",
-        "assembly_bytes",
-        "factor_bytes",
-        "peak_bytes",
-    )
-    header = [f"{c}_s" if c in TIMES else c for c in columns]
-    return Findings(draw(grown, direct), header, [[getattr(size, c) for c in columns] for size in sizes], numbers)
+    header = [f"{c}_s" if c in TIMES else c for c in COLUMNS]
+    return Findings(draw(grown, direct), header, [[getattr(size, c) for c in COLUMNS] for size in sizes], found)
+
+
+def compute(cells: dict[int, tuple[int, ...]], direct: str) -> dict[int, dict[str, list[Size]]]:
+    """By dimension and solver, the sizes."""
+    names = [direct, *(["umfpack"] if direct != "umfpack" else []), "two-level"]
+    longest = {name: LONGEST["direct" if name == direct else name] for name in names}
+    return {d: {name: series(d, name, counts, longest[name]) for name in names} for d, counts in cells.items()}
+
+
+def numbers(grown: dict[int, dict[str, list[Size]]], direct: str) -> dict[str, float | int | str]:
+    """Exponents, largest sizes, and the solvers against each other."""
+    found: dict[str, float | int | str] = {}
+    for dimension, by_name in grown.items():
+        found |= of_direct(f"{dimension}d", by_name[direct])
+        found |= of_two_level(f"{dimension}d", by_name["two-level"], by_name[direct])
+        if direct != "umfpack":
+            found |= of_umfpack(f"{dimension}d", by_name["umfpack"], by_name[direct])
+    return found | of_steps(grown[3]["two-level"], grown[3][direct])
 
 
 def of_direct(d: str, sizes: Sequence[Size]) -> dict[str, float | int | str]:
@@ -393,13 +389,14 @@ def draw(grown: dict[int, dict[str, list[Size]]], direct: str) -> Figure:
     figure, axes = plt.subplots(2, 2, figsize=(9.6, 7.2), width_ratios=(1.5, 1))
     for row, (dimension, by_name) in zip(axes, grown.items(), strict=True):
         for ax in row:
-            ax.set(xscale="log", yscale="log", xlabel="unknowns N")
+            ax.set(xscale="log", yscale="log", xlabel="unknowns N [-]")
         draw_times(row[0], dimension, by_name, direct)
         draw_memory(row[1], dimension, by_name, direct)
         for ax in row:
-            ax.set_title(f"{dimension}-d", loc="left")
+            ax.set_title(f"{dimension}-d, {'time of an iteration' if ax is row[0] else 'memory'}")
             for axis in (ax.xaxis, ax.yaxis):
                 axis.set_minor_formatter(NullFormatter())
+    letter_panels(axes.flat)
     return figure
 
 
@@ -421,12 +418,12 @@ def draw_times(ax: Axes, dimension: int, by_name: dict[str, list[Size]], direct:
     for part in TIMES:
         style, colour = styles.get(part, ("v:", "0.0"))
         ax.plot(unknowns, [getattr(s, part) for s in sizes], style, color=colour, ms=4, lw=1.1, label=labels[part])
-    for name, style, colour in (("umfpack", "x-.", "C1"), ("two-level", "P-", "C0")):
+    for name, style, colour in (("umfpack", "x-.", "0.4"), ("two-level", "P-", "0.4")):
         if name in by_name and name != direct:
             what = "numeric" if name == "umfpack" else "prepare and solve"
             values = [s.again if name == "umfpack" else s.linear for s in by_name[name]]
             where = [s.unknowns for s in by_name[name]]
-            ax.plot(where, values, style, color=colour, ms=5, lw=1.4, label=f"{NAMES[name]}, {what}")
+            ax.plot(where, values, style, color=colour, mfc="w", ms=6, lw=1.8, label=f"{NAMES[name]}, {what}")
     last = sizes[-1]
     for value, power, side in ((2.5 * last.first, THEORY[dimension]["time"], "right"), (0.5 * last.residual, 1.0, "left")):
         draw_slope(ax, last.unknowns, value, power, "N" if power == 1 else f"N^{{{power:g}}}", side)
@@ -437,12 +434,14 @@ def draw_times(ax: Axes, dimension: int, by_name: dict[str, list[Size]], direct:
 def draw_memory(ax: Axes, dimension: int, by_name: dict[str, list[Size]], direct: str) -> None:
     """Bytes per unknown of the factors and of the matrix."""
     styles = {direct: "o-", "umfpack": "x-.", "two-level": "P-"}
-    colours = {"umfpack": "C1", "two-level": "C0"}
+    colours = {"umfpack": "0.4", "two-level": "0.4"}
     for name, sizes in by_name.items():
         if name == direct or name in colours:
-            colour = "k" if name == direct else colours[name]
+            colour, fill = ("k", "k") if name == direct else (colours[name], "w")
             values = [s.factor_bytes / s.unknowns / 1024 for s in sizes]
-            ax.plot([s.unknowns for s in sizes], values, styles[name], color=colour, ms=4, lw=1.2, label=NAMES[name])
+            ax.plot(
+                [s.unknowns for s in sizes], values, styles[name], color=colour, mfc=fill, ms=5, lw=1.4, label=NAMES[name]
+            )
     matrix = by_name[direct]
     values = [s.assembly_bytes / s.unknowns / 1024 for s in matrix]
     ax.plot([s.unknowns for s in matrix], values, "s-", color="0.55", ms=4, lw=1.1, label="matrix")

@@ -378,6 +378,9 @@ def draw(comparison: Comparison) -> Figure:
     if comparison.plain:
         right.annotate("the plain script writes no pressures", (0.97, 0.95), xycoords="axes fraction", fontsize=8,
                        ha="right", va="top", color="0.35")  # fmt: skip
+    apart = {"color": "0.4", "lw": 0.9, "ls": (0, (1, 3))}
+    left.axhline(comparison.reference.area_error(comparison.second), label="what two references differ by", **apart)
+    right.axhline(comparison.reference.pressure_error(comparison.second), **apart)
     left.set(xlabel="time loop [s]", ylabel="largest error of the area / area at 7000 s [-]", title="area")
     right.set(xlabel="time loop [s]", ylabel="error of the pressure, rms / rms [-]", title="pressure")
     letter_panels([left, right])
