@@ -54,10 +54,10 @@ from ngswell import (
 from ngswell.models.model import Model
 from ngswell.stepping.stepper import polynomial_at
 from studies.output import Findings, cost, letter_panels
-from studies.paper import free_swelling
+from studies.paper.free_swelling import PICTURES as ALL_PICTURES
 from studies.scenes import BLENDED, END, HEIGHT, INITIAL, WIDTH, free_swelling_block, with_model
 
-PICTURES = free_swelling.PICTURES[1:]
+PICTURES = ALL_PICTURES[1:]
 SCRIPT = Path(__file__).resolve().parents[3] / "shared" / "peers" / "plain_ngsolve.py"
 BENDS = {"x": BLENDED, "y": BLENDED}
 """Where the blended baths bend [mm]."""

@@ -35,9 +35,7 @@ from ngswell import BACKWARD_EULER, TABLE_2, Adaptive, Area, Ledger, Probe, Prog
 from ngswell.closed_forms.homogeneous import homogeneous_equilibrium
 from ngswell.plotting import on_deformed_body
 from studies.output import Findings, cost, letter_panels
-from studies.scenes import BOTTOM, END, HEIGHT, INITIAL, SIDE, WIDTH, free_swelling_block, with_model
-
-scene, remodelled = free_swelling_block, with_model  # TODO remove
+from studies.scenes import BOTTOM, END, HEIGHT, INITIAL, SIDE, WIDTH, free_swelling_block
 
 AT_REST = 2e5  # s
 PICTURES = (0.0, 7000.0, 7107.0, 7224.0, 7650.0, 11000.0)  # s

@@ -3,9 +3,11 @@
 import csv
 import json
 
+import matplotlib.pyplot as plt
 import pytest
 
 from studies.__main__ import STUDIES, main
+from studies.output import letter_panels
 
 META = {
     "mesh",
@@ -54,6 +56,11 @@ def test_oscillation(tmp_path):
     assert numbers["lagged_max_mm"] > 1e-5
     assert numbers["weak_max_mm"] < 1e-12
     assert numbers["column_factor"] == pytest.approx(-0.733, abs=5e-4)
+    # The factor is a property of the mesh: finer cells along or across, faster growth.
+    assert numbers["lagged_growth_predicted_1x30"] == pytest.approx(numbers["lagged_growth_predicted"], rel=1e-5)
+    for finer in (("1x15", "1x30", "1x60"), ("1x30", "2x30", "4x30")):
+        factors = [numbers[f"lagged_growth_predicted_{mesh}"] for mesh in finer]
+        assert factors == sorted(factors, reverse=True)
     assert {row[0] for row in rows[1:]} == {"lagged", "weak"}
 
 
@@ -134,6 +141,25 @@ def test_output_is_refused_before_computing(tmp_path, capsys):
     (tmp_path / "file").write_text("")
     assert main(["oscillation", "--out", str(tmp_path / "file" / "deeper")]) == 1
     assert "cannot be made" in capsys.readouterr().err
+
+
+def test_an_option_of_another_study_is_refused(capsys, tmp_path):
+    script = tmp_path / "plain.py"
+    script.write_text("")
+    for arguments, owner in ((["--from-rest"], "free_swelling"), (["--plain", str(script)], "speed_error")):
+        for name in ([], ["oscillation"]):
+            with pytest.raises(SystemExit):
+                main([*name, *arguments])
+            assert f"{arguments[0]} goes with {owner}" in capsys.readouterr().err
+
+
+def test_every_panel_has_a_letter():
+    _, axes = plt.subplots(1, 2)
+    axes[0].set_title("area")
+    letter_panels(axes)
+    assert [ax.get_title("left") for ax in axes] == ["(a) area", "(b)"]
+    assert not any(ax.get_title() for ax in axes)
+    plt.close("all")
 
 
 def test_an_unknown_study_lists_the_known_ones(capsys):

@@ -32,7 +32,8 @@ from ngswell.analysis.stability import growth_factor, leading_eigenvalues
 from ngswell.closed_forms.homogeneous import homogeneous_equilibrium, lagged_column_factor
 from ngswell.physics import donnan
 from ngswell.problem.problem import Snapshot
-from studies.paper.oscillation import disturbed, measured_growth
+from studies.paper.oscillation import measured_growth
+from studies.scenes import disturbed
 
 SOFT = replace(TABLE_1, mu=0.06)
 """Here the dead load p0 exceeds µ and the strip would buckle, faster than steps of 0.1 s and more can resolve: backward

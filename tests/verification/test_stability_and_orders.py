@@ -30,7 +30,8 @@ from ngswell import (
 from ngswell.analysis.stability import growth_factor
 from ngswell.closed_forms.homogeneous import homogeneous_equilibrium, lagged_column_factor
 from ngswell.models.concentration import State
-from studies.paper.oscillation import disturbed, measured_growth
+from studies.paper.oscillation import measured_growth
+from studies.scenes import disturbed
 
 FALLING = Ramp((0, 0.15), (10, 0.125))
 
