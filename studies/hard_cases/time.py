@@ -116,7 +116,7 @@ def sudden_steps(quick: bool) -> list[Attempt]:
     - "J": 20 steps of 1e4 s and more, the closed form at rest; (1 + 5e-3 Δt)⁻²⁰ is below round-off.
     """
     change, fine = DILUTED - BATH, column(COLUMN_HEIGHT, CELLS, grade={"top": 30})
-    found = [attempt for step in (STEPS[::3] if quick else STEPS) for attempt in in_steps_of(step, change, quick)]
+    found = [one for step in (STEPS[::3] if quick else STEPS) for one in in_steps_of(step, change, quick)]
     for name in DEFAULTS:
         found.append(sudden_run("adaptive", name, "J", change, Adaptive(1e-3), 1e6, 1e-8))
         title = "steps of 0.01 s, graded"
