@@ -43,7 +43,7 @@ def swelling(quick: bool) -> list[Attempt]:
     Error: of the volume at rest against the closed form. The state is homogeneous: `AT_REST` bounds it once it has come to
     rest, which a soft gel takes long to do (up to 1e13 s for a millimetre). A ledger that closes to 1e-7 says that nothing
     was lost on the way. The rim of a free body swells first and is held by its core: where it wrinkles, as on the 2 × 2 × 2
-    cells of a cube at J = 30, the tangent without flow has negative eigenvalues (`convergence.undrained`) and the run stops.
+    cells of a cube at J = 30, the tangent without flow has negative eigenvalues (`spectra.undrained`) and the run stops.
     """
     found = []
     for motion, cells in {"confined": 10, "plane strain": 4, "3-d": 2}.items():
