@@ -4,11 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from math import inf, isfinite
-from typing import Any, TypeGuard, TypeVar
+from typing import Any, TypeAlias, TypeGuard, TypeVar
 
 import numpy as np
+from ngsolve import CoefficientFunction
 
 from ngswell.errors import InputError
+
+Field: TypeAlias = float | CoefficientFunction
+"""A parameter: one number, or a CoefficientFunction of position in the reference configuration."""
 
 Thing = TypeVar("Thing")
 
@@ -16,7 +20,7 @@ LONGEST = 80
 """Characters of a value in a message."""
 
 
-def shown(value: object) -> str:
+def short(value: object) -> str:
     """A value on one line of a message, cut where it is long."""
     try:
         text = " ".join(repr(value).split())
@@ -34,10 +38,10 @@ def number(what: str, value: object, unit: str = "", low: float = -inf, high: fl
     """`value` as a float: one finite number within `low` … `high`, the ends included."""
     unit = f" {unit}" if unit else ""
     if not is_number(value):
-        raise InputError(f"{what} has to be a number{f' [{unit[1:]}]' if unit else ''}, got {shown(value)}")
+        raise InputError(f"{what} has to be a number{f' [{unit[1:]}]' if unit else ''}, got {short(value)}")
     result = as_float(value)
     if not isfinite(result):
-        raise InputError(f"{what} = {shown(value)}{unit} is not finite{hint and f': {hint}'}")
+        raise InputError(f"{what} = {short(value)}{unit} is not finite{hint and f': {hint}'}")
     if not low <= result <= high:
         raise InputError(f"{what} = {result:.6g}{unit} is outside {low:g} … {high:g}{hint and f': {hint}'}")
     return result
@@ -54,38 +58,38 @@ def as_float(value: float) -> float:
 def positive(what: str, value: object, unit: str = "") -> float:
     """`value` as a float: one number above zero, and finite."""
     if not (is_number(value) and 0 < (result := as_float(value)) < inf):
-        raise InputError(f"{what} has to be positive and finite, got {shown(value)} {unit}".rstrip())
+        raise InputError(f"{what} has to be positive and finite, got {short(value)} {unit}".rstrip())
     return result
 
 
-def whole(what: str, value: object, low: int, high: int) -> int:
+def integer(what: str, value: object, low: int, high: int) -> int:
     """`value` as an int from `low` to `high`."""
     if not (isinstance(value, (int, np.integer)) and not isinstance(value, bool) and low <= value <= high):
-        raise InputError(f"{what} {shown(value)} is not a whole number from {low} to {high}")
+        raise InputError(f"{what} {short(value)} is not a whole number from {low} to {high}")
     return int(value)
 
 
 def flag(what: str, value: object) -> None:
     """Refuse what is neither True nor False."""
     if not isinstance(value, (bool, np.bool_)):
-        raise InputError(f"{what} has to be True or False, got {shown(value)}")
+        raise InputError(f"{what} has to be True or False, got {short(value)}")
 
 
 def vector(what: str, values: Any, limit: float, unit: str = "") -> tuple[float, ...]:
     """`values` as a tuple of finite numbers within ±`limit`."""
     unit = f" {unit}" if unit else ""
-    components = entries(values)
+    components = as_tuple(values)
     if components is None:
-        raise InputError(f"{what} has to be some numbers, such as (0.0, 1.0){unit}, got {shown(values)}")
+        raise InputError(f"{what} has to be some numbers, such as (0.0, 1.0){unit}, got {short(values)}")
     for value in components:
         if not (is_number(value) and abs(as_float(value)) <= limit):
             raise InputError(
-                f"{what} has a component {shown(value)}{unit}: it has to be a number, finite and within ±{limit:g}"
+                f"{what} has a component {short(value)}{unit}: it has to be a number, finite and within ±{limit:g}"
             )
     return tuple(map(as_float, components))
 
 
-def entries(values: Any) -> tuple | None:
+def as_tuple(values: Any) -> tuple | None:
     """What a list, tuple, array or generator holds; None for anything else."""
     if isinstance(values, (str, bytes, dict)) or not isinstance(values, Iterable):
         return None
@@ -95,17 +99,24 @@ def entries(values: Any) -> tuple | None:
         return None
 
 
+def scalar(what: str, field: CoefficientFunction) -> None:
+    """Refuse fields of vectors and of complex numbers."""
+    if field.dim != 1 or field.is_complex:
+        kind = "complex values" if field.is_complex else f"{field.dim} components"
+        raise InputError(f"{what} has to be scalar and real, got a CoefficientFunction of {kind}")
+
+
 def name(what: str, value: object, example: str) -> None:
     """Refuse what is no string or an empty one."""
     if not (isinstance(value, str) and value):
-        raise InputError(f"{what} has to be a name, such as {example!r}, got {shown(value)}")
+        raise InputError(f"{what} has to be a name, such as {example!r}, got {short(value)}")
 
 
-def one_of(what: str, value: object, choices: Iterable[str]) -> None:
+def choice(what: str, value: object, choices: Iterable[str]) -> None:
     """Refuse what is none of the words `choices`."""
     words = tuple(choices)
     if not (isinstance(value, str) and value in words):
-        raise InputError(f"{what} {shown(value)} is none of {', '.join(map(repr, words))}")
+        raise InputError(f"{what} {short(value)} is none of {', '.join(map(repr, words))}")
 
 
 def is_a(value: object, kind: Any) -> bool:
@@ -116,23 +127,23 @@ def is_a(value: object, kind: Any) -> bool:
 def instance(what: str, value: object, kind: Any, choices: str) -> None:
     """Refuse what is not an instance of `kind`; `choices` says what is."""
     if not is_a(value, kind):
-        given = f"the class {value.__name__}" if isinstance(value, type) else shown(value)
+        given = f"the class {value.__name__}" if isinstance(value, type) else short(value)
         raise InputError(f"{what} has to be {choices}, got {given}")
 
 
 def several(what: str, values: Any, kind: Any, choices: str) -> tuple:
     """`values` as a tuple of instances of `kind`."""
     if is_a(values, kind):
-        raise InputError(f"{what} has to be a list, got one {type(values).__name__}: put it in brackets, [{shown(values)}]")
-    found = entries(values)
+        raise InputError(f"{what} has to be a list, got one {type(values).__name__}: put it in brackets, [{short(values)}]")
+    found = as_tuple(values)
     if found is None:
-        raise InputError(f"{what} has to be a list of {choices}, got {shown(values)}")
+        raise InputError(f"{what} has to be a list of {choices}, got {short(values)}")
     for value in found:
         instance(f"an entry of {what}", value, kind, choices)
     return found
 
 
-def settle(thing: object, **values: object) -> None:
+def set_fields(thing: object, **values: object) -> None:
     """Give fields of a frozen dataclass the form in which it uses them."""
     for field, value in values.items():
         object.__setattr__(thing, field, value)

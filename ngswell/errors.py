@@ -1,6 +1,11 @@
-"""The exceptions a user can meet. Each message names the thing, its value and the remedy."""
+"""The exceptions a user can meet, and why a step can fail. Each message names the thing, its value and the remedy."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+from math import inf
+from typing import Any
 
 
 class NgswellError(Exception):
@@ -15,37 +20,145 @@ class OutputError(NgswellError, OSError):
     """A result that cannot be written where it was asked for."""
 
 
-class StepError(NgswellError, RuntimeError):
-    """No time step succeeds any more. The scene's fields hold the last accepted state.
+class Reason(Enum):
+    """Why an attempt at a step, or a state of rest, was given up; the value says it in words."""
 
-    Attributes: `time` [s] of the last accepted state, `step` [s] last tried, `field` with the worst correction,
-    `where` its position [mm], `reason` in words.
+    NOT_ADMISSIBLE_AT_START = "the step starts with {what} not positive"
+    NOT_ADMISSIBLE = "{what} would not stay positive"
+    NOT_A_SOLUTION = "{what} is not positive in the solution"
+    STALLED = "Newton's method stalls: no damped step reduces the correction"
+    TOO_MANY_ITERATIONS = "Newton's method needs more than {what} iterations"
+    SINGULAR = "the linear system is singular or not finite"
+    UNDETERMINED = "the linear system is singular: {what}"
+    ESTIMATE_NOT_FINITE = "the estimated error is not finite"
+    ERROR_ABOVE_TOLERANCE = "error above the tolerance"
+    UNSTABLE = "the state is unstable: {what}"
+
+    def text(self, what: str = "") -> str:
+        """The reason in words, about `what`."""
+        return self.value.format(what=what)
+
+
+_SQUEEZED = "Remedies: a smaller or slower load or change of the bath, a finer mesh there."
+_LOST = (
+    "Remedies: a gentler ramp, a finer mesh where the field is worst, a weaker penalty; the surface of a gel that is held "
+    "sideways and swells beyond J = 2.5 may wrinkle."
+)
+
+REMEDIES = {
+    Reason.NOT_ADMISSIBLE_AT_START: _SQUEEZED,
+    Reason.NOT_ADMISSIBLE: _SQUEEZED,
+    Reason.NOT_A_SOLUTION: (
+        "Remedies: Penalty or Multiplier in place of Nitsche; where anions are few, a slower change of bath or charge, "
+        "finer cells at the bath; Potential(), whose ions cannot be negative."
+    ),
+    Reason.STALLED: _LOST,
+    Reason.TOO_MANY_ITERATIONS: _LOST,
+    Reason.SINGULAR: _LOST,
+    Reason.ESTIMATE_NOT_FINITE: _LOST,
+    Reason.UNDETERMINED: "Remedies: a support for what can move, a bath or a free side for a pressure.",
+    Reason.ERROR_ABOVE_TOLERANCE: "Remedies: a larger tolerance, a gentler ramp, a finer mesh where the field is worst.",
+    Reason.UNSTABLE: (
+        "Remedies: to let it grow, an imperfection that seeds it, steps well below that time and Stability(follow=True); to "
+        "avoid it, a bath of more salt, a surface that is held, or Confined, which leaves wrinkles out."
+    ),
+}
+"""What helps against each reason."""
+
+UNCONVERGED = frozenset({Reason.STALLED, Reason.TOO_MANY_ITERATIONS, Reason.SINGULAR, Reason.ESTIMATE_NOT_FINITE})
+"""Reasons that say nothing about the cause yet."""
+
+
+@dataclass(frozen=True)
+class Failure:
+    """Why an attempt failed: the reason, what it is about (a field's bound, a motion, a number), the field and the place.
+
+    `remedy` is the one to name where the cause, found later, has another than the first reason.
     """
 
-    def __init__(self, time: float, step: float, field: str, where: tuple[float, ...], reason: str, remedy: str) -> None:
-        self.time, self.step, self.field, self.where, self.reason = time, step, field, where, reason
-        place = ", ".join(f"{x:.4g}" for x in where)
+    reason: Reason
+    field: str = ""
+    where: tuple[float, ...] = ()  # [mm]
+    what: str = ""
+
+    @property
+    def text(self) -> str:
+        return self.reason.text(self.what)
+
+    @property
+    def remedy(self) -> str:
+        return REMEDIES[self.reason]
+
+
+def place(where: Any) -> str:
+    """A position [mm] in a message."""
+    return f"({', '.join(f'{x:.4g}' for x in where)})"
+
+
+class StepError(NgswellError, RuntimeError):
+    """No time step succeeds any more.
+
+    Attributes: `time` [s] of the last accepted state, `step` [s] last tried, `failure` (reason, field with the worst
+    correction, where), and `causes` that were found beside it. `end` is the last accepted state, a snapshot that
+    `scene.run(..., resume=error.end)` goes on from and `scene.state(error.end)` evaluates.
+    """
+
+    end: Any = None
+
+    def __init__(
+        self, time: float, step: float, failure: Failure, cause: Failure | None = None, opening: str = "", end: Any = None
+    ) -> None:
+        self.time, self.step, self.failure, self.cause, self.end = time, step, failure, cause, end
+        texts = [] if cause is not None and cause.reason is Reason.UNDETERMINED else [failure.text]
+        texts += [] if cause is None else [cause.text]
+        opening = opening or f"no step succeeds after t = {time:.10g} s (last tried: {step:.3g} s)"
         super().__init__(
-            f"no step succeeds after t = {time:.10g} s (last tried: {step:.3g} s): {reason}; "
-            f"worst field {field} near ({place}) mm. The fields hold the state at t = {time:.10g} s. {remedy}"
+            f"{opening}: {'; '.join(texts)}; "
+            f"worst field {failure.field} near {place(failure.where)} mm. "
+            f"The last accepted state is that at t = {time:.10g} s. {(cause or failure).remedy}"
         )
+
+    @property
+    def reason(self) -> Reason:
+        """Why: the cause where one was found, else how the last attempt failed."""
+        return (self.cause or self.failure).reason
+
+    @property
+    def field(self) -> str:
+        return self.failure.field
+
+    @property
+    def where(self) -> tuple[float, ...]:
+        return self.failure.where
 
 
 class InstabilityError(StepError):
-    """The state reached is unstable, or its growth is not followed by the steps. The scene's fields hold it.
+    """The state reached is unstable, or its growth is not followed by the steps.
 
     Beside those of StepError, attributes: `rate` of growth [1/s] (infinite: without flow), `wavelength` [mm] of the mode.
     """
 
     def __init__(
-        self, time: float, step: float, where: tuple[float, ...], rate: float, wavelength: float, reason: str
+        self, time: float, step: float, where: tuple[float, ...], rate: float, wavelength: float, what: str, lost: bool
     ) -> None:
-        self.time, self.step, self.field, self.where, self.reason = time, step, "u", where, reason
-        self.rate, self.wavelength = rate, wavelength
-        RuntimeError.__init__(self, f"{reason} The fields hold the state at t = {time:.10g} s. {REMEDY}")
+        self.time, self.step, self.rate, self.wavelength = time, step, rate, wavelength
+        self.failure, self.cause = Failure(Reason.UNSTABLE, "u", where, what), None
+        said = f"the state at t = {time:.10g} s is unstable: {what}."
+        if lost:
+            said += f" Stages of {step:.3g} s do not follow that."
+        RuntimeError.__init__(self, f"{said} The last accepted state is that at t = {time:.10g} s. {self.failure.remedy}")
 
 
-REMEDY = (
-    "Remedies: to let it grow, an imperfection that seeds it, steps well below that time and Stability(follow=True); to "
-    "avoid it, a bath of more salt, a surface that is held, or Confined, which leaves wrinkles out."
-)
+@dataclass(frozen=True)
+class Rejection:
+    """A rejected attempt at a step: its size [s], why, what the reason is about, and the estimated error if there is one."""
+
+    dt: float
+    reason: Reason
+    what: str = ""
+    error: float = inf
+
+    def __str__(self) -> str:
+        if self.reason is Reason.ERROR_ABOVE_TOLERANCE:
+            return f"dt = {self.dt:.3g} s: error {self.error:.2g}"
+        return f"dt = {self.dt:.3g} s: {self.reason.text(self.what)}"

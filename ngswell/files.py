@@ -2,12 +2,22 @@
 
 from __future__ import annotations
 
+import json
 import os
-from collections.abc import Iterator
+import zipfile
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any, TypeAlias
 
-from ngswell.errors import OutputError
+import numpy as np
+from numpy.typing import NDArray
+
+from ngswell.checks import short
+from ngswell.errors import InputError, OutputError
+
+Tree: TypeAlias = dict[str, Any]
+"""Arrays by name, in as many levels as their owners like: a value is an array or another Tree."""
 
 
 @contextmanager
@@ -35,6 +45,9 @@ def replacing(path: Path, what: str) -> Iterator[Path]:
 
 
 def _to_disk(path: Path, flags: int) -> None:
+    """Wait until a file, or the entry of one in a folder, is on the disk."""
+    if path.is_dir() and os.name == "nt":  # Windows opens no folders; it writes their entries through
+        return
     file = os.open(path, flags)
     try:
         os.fsync(file)
@@ -48,3 +61,53 @@ def check_folder(folder: Path, what: str) -> None:
         raise OutputError(f"{what}: there is no folder {folder}; make it first")
     if not os.access(folder, os.W_OK | os.X_OK):
         raise OutputError(f"{what}: the folder {folder} cannot be written to")
+
+
+HEADER = "header"
+"""Name of the archive's entry that holds what is not an array; the arrays are numbered."""
+
+
+def write_tree(path: Path, what: str, header: Mapping[str, Any], tree: Tree) -> None:
+    """A tree of arrays and a header of JSON values in one file, whole or not at all; raises OutputError.
+
+    Raises InputError for a value that is no array of numbers or texts: it could not be read back.
+    """
+    entries = list(_flat(tree))
+    for names, array in entries:
+        if array is not None and array.dtype.hasobject:
+            raise InputError(f"{what}: {'/'.join(names)} holds {short(array.tolist())}; keep arrays of numbers or texts")
+    arrays = {str(number): array for number, (_, array) in enumerate(entries) if array is not None}
+    text = json.dumps({**header, "entries": [[list(names), array is not None] for names, array in entries]})
+    with replacing(path, what) as new, open(new, "wb") as file:
+        np.savez(file, **{HEADER: np.array(text.encode()), **arrays})  # type: ignore[arg-type]
+
+
+def read_tree(path: Path) -> tuple[dict[str, Any], Tree]:
+    """Header and tree of a file that `write_tree` wrote. Raises what a damaged file makes zipfile, numpy and json raise."""
+    with zipfile.ZipFile(path) as archive:
+        damaged = archive.testzip()
+    if damaged is not None:
+        raise ValueError(f"checksum of {damaged}")
+    tree: Tree = {}
+    with np.load(path, allow_pickle=False) as archive:
+        if HEADER not in archive.files:
+            raise ValueError(f"nothing in it is called {HEADER}")
+        header = json.loads(archive[HEADER].item())
+        for number, (names, is_array) in enumerate(header.pop("entries")):
+            branch = tree
+            for name in names[:-1] if is_array else names:
+                branch = branch.setdefault(name, {})
+            if is_array:
+                branch[names[-1]] = archive[str(number)]
+    return header, tree
+
+
+def _flat(tree: Tree, above: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], NDArray | None]]:
+    """Entries of a tree as (names, array); a branch without entries keeps its place, without an array."""
+    if not tree and above:
+        yield above, None
+    for name, value in tree.items():
+        if isinstance(value, dict):
+            yield from _flat(value, (*above, name))
+        else:
+            yield (*above, name), np.asarray(value)

@@ -13,7 +13,7 @@ from ngsolve import CF, ET, VOL, CoefficientFunction, IntegrationRule, x, y
 from numpy.typing import NDArray
 
 from ngswell.errors import InputError
-from ngswell.problem.problem import Problem
+from ngswell.models.solid_state import SolidState
 
 STYLE: dict[str, Any] = {
     "font.family": "serif",
@@ -56,17 +56,18 @@ class Picture:
         return Picture(mesh, self.values, outlines)
 
 
-def on_deformed_body(problem: Problem, field: CoefficientFunction, cuts: int = 3) -> Picture:
-    """Sample `field` on the deformed cells of a 2-d mesh, each cut into `cuts`² pieces."""
-    if problem.mesh.dim != 2:
+def on_deformed_body(state: SolidState, field: CoefficientFunction, cuts: int = 3) -> Picture:
+    """Sample `field` of a state (`result.state`) on the deformed cells of a 2-d mesh, each cut into `cuts`² pieces."""
+    mesh = state.mesh
+    if mesh.dim != 2:
         raise InputError("pictures of the deformed body need a 2-d mesh")
     triangles, places, values, outlines, count = [], [], [], [], 0
     for shape in (ET.QUAD, ET.TRIG):
         local, pieces, rim = _cut(shape, cuts)
-        where = problem.mesh.MapToAllElements({shape: IntegrationRule(local, [0.0] * len(local))}, VOL)
+        where = mesh.MapToAllElements({shape: IntegrationRule(local, [0.0] * len(local))}, VOL)
         if not len(where):
             continue
-        deformed = (CF((x, y)) + problem.state.u)(where)
+        deformed = (CF((x, y)) + state.u)(where)
         offsets = np.arange(0, len(deformed), len(local))
         triangles.append((count + offsets[:, None, None] + pieces).reshape(-1, 3))
         places.append(deformed)
@@ -74,8 +75,8 @@ def on_deformed_body(problem: Problem, field: CoefficientFunction, cuts: int = 3
         outlines.append(deformed[offsets[:, None] + rim])
         count += len(deformed)
     points = np.concatenate(places)
-    mesh = Triangulation(points[:, 0], points[:, 1], np.concatenate(triangles))
-    return Picture(mesh, np.concatenate(values), np.concatenate(outlines))
+    triangulation = Triangulation(points[:, 0], points[:, 1], np.concatenate(triangles))
+    return Picture(triangulation, np.concatenate(values), np.concatenate(outlines))
 
 
 def _cut(shape: ET, cuts: int) -> tuple[list[tuple[float, float]], NDArray, NDArray]:

@@ -16,8 +16,8 @@ from ngsolve import CoefficientFunction, Parameter
 from numpy.typing import NDArray
 
 from ngswell import checks
+from ngswell.checks import Field
 from ngswell.errors import InputError
-from ngswell.physics.material import Field, check_scalar
 
 LARGEST = 1e15
 """Times and values beyond this are none that a history can mean."""
@@ -33,7 +33,14 @@ class Signal:
 
 @runtime_checkable
 class Schedule(Protocol):
-    """A value over time: the times at which it bends [s], all values it passes, and its form in a run."""
+    """A value over time. A history of one's own gives, numbered:
+
+    1. `kinks`, the times at which it bends [s]: steps land on them and forget their past there;
+    2. `values`, all that it passes, for refusals and natural sizes;
+    3. `at`, its value at a time, and `uniform`, whether that is one number for all places;
+    4. `signal`, its form in a run;
+    5. `check_on`, its refusals once the places are known.
+    """
 
     @property
     def kinks(self) -> tuple[float, ...]: ...
@@ -41,7 +48,14 @@ class Schedule(Protocol):
     @property
     def values(self) -> tuple[float, ...]: ...
 
+    @property
+    def uniform(self) -> bool: ...
+
     def at(self, time: float) -> float | CoefficientFunction: ...
+
+    def check_on(self, where: NDArray) -> None:
+        """Refuse what the history cannot mean at the mesh points `where`."""
+        ...
 
     def signal(self) -> Signal: ...
 
@@ -62,13 +76,18 @@ class Ramp:
         pairs = [checks.vector("Ramp: a (time, value) point", point, LARGEST) for point in points]
         for pair in pairs:
             if len(pair) != 2:
-                raise InputError(f"Ramp takes points (time, value), Ramp((0, 1.0), (60, 2.0)), got {checks.shown(pair)}")
+                raise InputError(f"Ramp takes points (time, value), Ramp((0, 1.0), (60, 2.0)), got {checks.short(pair)}")
         times, values = (tuple(column) for column in zip(*pairs, strict=True))
         for before, after in pairwise(times):
             if after <= before:
                 raise InputError(f"Ramp times have to increase, but {after:g} s follows {before:g} s")
         object.__setattr__(self, "times", times)
         object.__setattr__(self, "values", values)
+
+    uniform = True
+
+    def check_on(self, where: NDArray) -> None:
+        pass
 
     @property
     def kinks(self) -> tuple[float, ...]:
@@ -95,13 +114,15 @@ class Blend:
     second: Ramp
     weight: Field
 
+    uniform = False
+
     def __post_init__(self) -> None:
         for history in (self.first, self.second):
             checks.instance("Blend: a history", history, Ramp, "a Ramp, such as Ramp((0, 0.15))")
         if isinstance(self.weight, CoefficientFunction):
-            check_scalar("Blend: weight", self.weight)
+            checks.scalar("Blend: weight", self.weight)
         else:
-            checks.settle(self, weight=checks.number("Blend: weight", self.weight, low=0.0, high=1.0))
+            checks.set_fields(self, weight=checks.number("Blend: weight", self.weight, low=0.0, high=1.0))
 
     def check_on(self, where: NDArray) -> None:
         """Refuse a weight that leaves [0, 1] at the mesh points `where`, by more than round-off."""
@@ -138,3 +159,24 @@ def schedule(what: str, value: float | Schedule) -> Schedule:
     if checks.is_a(value, Schedule):
         return cast(Schedule, value)
     return Ramp((0.0, checks.number(what, value, hint="or a history, Ramp(...) or Blend(...)")))
+
+
+class Clock:
+    """The time of a discrete problem [s], and the fields that follow it."""
+
+    def __init__(self, time: float) -> None:
+        self.time = time
+        self._signals: list[Signal] = []
+
+    def follow(self, history: Schedule) -> CoefficientFunction:
+        """A field that has the history's value at the clock's time."""
+        signal = history.signal()
+        signal.set(self.time)
+        self._signals.append(signal)
+        return signal.field
+
+    def set(self, time: float) -> None:
+        """Move all fields to `time` [s]."""
+        self.time = time
+        for signal in self._signals:
+            signal.set(time)

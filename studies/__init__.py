@@ -1,1 +1,1 @@
-"""Studies: one file a question. Each draws a figure and writes its series and its numbers."""
+"""Studies in rooms: each draws a figure and writes its series and its numbers; scenes they share are in `scenes`."""

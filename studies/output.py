@@ -1,4 +1,4 @@
-"""What every study writes: NAME.png, NAME.csv and NAME.json."""
+"""What every study writes: NAME.png, NAME.csv and NAME.json; letters of the panels."""
 
 from __future__ import annotations
 
@@ -7,11 +7,13 @@ import importlib.metadata
 import json
 import math
 import platform
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
+from string import ascii_lowercase
 
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ngswell import OutputError, Result, __version__
@@ -70,6 +72,14 @@ def cost(results: Sequence[Result]) -> dict[str, float | int]:
         "newton_iterations": sum(r.iterations for r in results),
         "seconds": round(sum(r.seconds for r in results), 2),
     }
+
+
+def letter_panels(panels: Iterable[Axes], pad: float | None = None) -> None:
+    """Put (a), (b), ... before the titles of the panels, all of them flush left, `pad` points above; call it last."""
+    for letter, ax in zip(ascii_lowercase, panels, strict=False):
+        title = ax.get_title("left") or ax.get_title("center")
+        ax.set_title("")
+        ax.set_title(f"({letter}) {title}".rstrip(), loc="left", pad=pad)
 
 
 def _versions() -> dict[str, str]:

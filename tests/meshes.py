@@ -3,13 +3,7 @@
 from netgen.occ import Box, WorkPlane, X, Y, Z
 from ngsolve import ET
 
-from ngswell import (
-    box,
-    column,
-    from_occ,
-    read_mesh,
-    rectangle,
-)
+from ngswell import box, column, from_occ, read_mesh, rectangle
 
 SIDES_2D = {"bottom": 2.0, "right": 1.0, "top": 2.0, "left": 1.0}  # of 2 × 1 mm
 

@@ -14,8 +14,10 @@ from math import ceil, inf, pi, sqrt
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ngswell.closed_forms.homogeneous import parameters
 from ngswell.errors import InputError
 from ngswell.physics.material import Material
+from ngswell.physics.solid import small_strain_moduli
 
 EARLIEST = 1e-8
 """Dimensionless time below which the series are refused: they would need more than 20 000 terms."""
@@ -23,7 +25,7 @@ EARLIEST = 1e-8
 
 def consolidation_coefficient(material: Material) -> float:
     """c_v = K (2µ + λ) [mm²/s]."""
-    return material.number("K") * _modulus(material)
+    return material.number("K") * _confined_modulus(material)
 
 
 def terzaghi_pressure(material: Material, load: float, height: float, z: ArrayLike, time: ArrayLike) -> NDArray:
@@ -41,7 +43,7 @@ def terzaghi_settlement(material: Material, load: float, height: float, time: Ar
     """Downward displacement of the column's top [mm]:  load h/M [1 − Σ (2/α²) exp(−α² T)]."""
     _, T = _scaled(material, "height", height, 0.0, time)
     alpha = _terzaghi_roots(T)
-    return load * height / _modulus(material) * (1 - (2 / alpha**2 * np.exp(-(alpha**2) * T)).sum(axis=-1))
+    return load * height / _confined_modulus(material) * (1 - (2 / alpha**2 * np.exp(-(alpha**2) * T)).sum(axis=-1))
 
 
 def mandel_pressure(material: Material, load: float, half_width: float, x: ArrayLike, time: ArrayLike) -> NDArray:
@@ -67,8 +69,8 @@ def mandel_shortening(material: Material, load: float, half_width: float, time: 
     _, T = _scaled(material, "half_width", half_width, 0.0, time)
     alpha, amplitude = _mandel_modes(material, T)
     mean = load * (amplitude * (np.sin(alpha) / alpha - np.cos(alpha)) * np.exp(-(alpha**2) * T)).sum(axis=-1)
-    mu, lam = material.number("mu"), material.number("lam")
-    return (load * _modulus(material) / (2 * mu) - mean) / (2 * mu + 2 * lam)
+    mu, lam = _moduli(material)
+    return (load * (2 * mu + lam) / (2 * mu) - mean) / (2 * mu + 2 * lam)
 
 
 def cryer_pressure(material: Material, load: float, radius: float, r: ArrayLike, time: ArrayLike) -> NDArray:
@@ -96,7 +98,7 @@ def cryer_settlement(material: Material, load: float, radius: float, time: Array
     """
     _, T = _scaled(material, "radius", radius, 0.0, time)
     alpha, denominator = _cryer_modes(material, T)
-    mu, lam = material.number("mu"), material.number("lam")
+    mu, lam = _moduli(material)
     transient = (np.sin(alpha) / denominator * np.exp(-(alpha**2) * T)).sum(axis=-1) / (2 * mu)
     return load * radius * (1 / (2 * mu + 3 * lam) + transient)
 
@@ -110,7 +112,8 @@ def _terzaghi_roots(T: NDArray) -> NDArray:
 
 def _mandel_modes(material: Material, T: NDArray) -> tuple[NDArray, NDArray]:
     """Roots of tan α = (M/µ) α, one in each (nπ, nπ + π/2) as M/µ > 1, and sin α / (α − sin α cos α)."""
-    slope = _modulus(material) / material.number("mu")
+    mu, lam = _moduli(material)
+    slope = (2 * mu + lam) / mu
     low = np.arange(_terms(T)) * pi
     low[0] = 1e-3  # α = 0 is no mode, and the first root is at 1.17 or above
     alpha = _roots(lambda a: np.sin(a) - slope * a * np.cos(a), low, np.arange(low.size) * pi + pi / 2)
@@ -119,7 +122,8 @@ def _mandel_modes(material: Material, T: NDArray) -> tuple[NDArray, NDArray]:
 
 def _cryer_modes(material: Material, T: NDArray) -> tuple[NDArray, NDArray]:
     """Roots of (η − α²) tan α = η α, one in each (nπ − π/2, nπ) as η ≤ 2, and α cos α + (2 − η) sin α."""
-    eta = 4 * material.number("mu") / _modulus(material)
+    mu, lam = _moduli(material)
+    eta = min(2.0, 4 * mu / (2 * mu + lam))  # beyond by round-off, the first bracket would hold no root
     high = np.arange(1, _terms(T) + 1) * pi
     alpha = _roots(lambda a: (eta - a * a) * np.sin(a) - eta * a * np.cos(a), high - pi / 2, high)
     return alpha, alpha * np.cos(alpha) + (2 - eta) * np.sin(alpha)
@@ -156,6 +160,13 @@ def _scaled(material: Material, name: str, length: float, position: ArrayLike, t
     return xi, T
 
 
-def _modulus(material: Material) -> float:
+def _moduli(material: Material) -> tuple[float, float]:
+    """µ and λ of small strains [N/mm²]."""
+    parameters(material)
+    return small_strain_moduli(material)
+
+
+def _confined_modulus(material: Material) -> float:
     """M = 2µ + λ, the stiffness in confined compression [N/mm²]."""
-    return 2 * material.number("mu") + material.number("lam")
+    mu, lam = _moduli(material)
+    return 2 * mu + lam

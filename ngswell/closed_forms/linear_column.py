@@ -24,8 +24,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from ngswell import checks
 from ngswell.baths.bath import checked_salt
+from ngswell.closed_forms.homogeneous import parameters
 from ngswell.errors import InputError
 from ngswell.physics.material import Material
+from ngswell.physics.solid import small_strain_moduli
 
 TERMS = 4000
 """Modes in a sum. What they leave out has decayed below 1e-17 for times beyond 3e-7 height²/κ, and in backward Euler is
@@ -49,9 +51,9 @@ class _Gel(NamedTuple):
 
 
 def _gel(material: Material, bath: float) -> _Gel:
-    mu, lam, nS0, cfc0, D_plus, D_minus, K = (
-        material.number(name) for name in ("mu", "lam", "nS0", "cfc0", "D_plus", "D_minus", "K")
-    )
+    nS0, cfc0 = parameters(material)
+    mu, lam = small_strain_moduli(material)
+    D_plus, D_minus, K = (material.number(name) for name in ("D_plus", "D_minus", "K"))
     bath = checked_salt("bath", bath)
     total = sqrt(4 * bath * bath + cfc0 * cfc0)
     plus = (total + cfc0) / 2

@@ -14,7 +14,7 @@ import numpy as np
 from ngsolve import Mesh
 from numpy.typing import NDArray
 
-from ngswell.errors import InputError
+from ngswell.errors import InputError, place
 from ngswell.mesh.shapes import check_mesh, check_named, check_plane
 
 _FRAME = {
@@ -98,8 +98,8 @@ def _check_single(what: str, groups: Groups, points: NDArray) -> None:
         cells = np.concatenate([cells for key, cells in groups.items() if key[1] == shape])
         different, times = np.unique(np.sort(cells), axis=0, return_counts=True)
         if times.max() > 1:
-            place = ", ".join(f"{x:.4g}" for x in points[different[times.argmax()]].mean(axis=0))
-            raise InputError(f"{what}: the {shape} near ({place}) mm is in two physical groups; put each into one")
+            where = place(points[different[times.argmax()]].mean(axis=0))
+            raise InputError(f"{what}: the {shape} near {where} mm is in two physical groups; put each into one")
 
 
 def _inside(sides: Groups, body: Groups, points: NDArray) -> dict[tuple[int, ...], NDArray]:
@@ -120,8 +120,8 @@ def _inside(sides: Groups, body: Groups, points: NDArray) -> dict[tuple[int, ...
 def _check_sides(what: str, sides: NDArray, inside: dict[tuple[int, ...], NDArray], points: NDArray) -> None:
     for side in sides:
         if tuple(sorted(side)) not in inside:
-            place = ", ".join(f"{x:.4g}" for x in points[side[0]])
-            raise InputError(f"{what} near ({place}) mm is no side of the body's cells; is the body in a physical group?")
+            where = place(points[side[0]])
+            raise InputError(f"{what} near {where} mm is no side of the body's cells; is the body in a physical group?")
 
 
 def _outward(sides: NDArray, points: NDArray, behind: NDArray, dim: int) -> NDArray:

@@ -13,7 +13,7 @@ from ngsolve.meshes import Make1DMesh, MakeStructured2DMesh, MakeStructured3DMes
 from numpy.typing import NDArray
 
 from ngswell import checks
-from ngswell.errors import InputError
+from ngswell.errors import InputError, place
 from ngswell.mesh.points import with_corners
 
 Grade = dict[str, float]
@@ -64,15 +64,15 @@ def rectangle(
     (width, height), (nx, ny) = _checked_sizes("rectangle", (width, height), (nx, ny))
     checks.flag("rectangle: triangles", triangles)
     xs, ys = _graded("rectangle", (width, height), (nx, ny), (("left", "right"), ("bottom", "top")), grade)
-    for axis, place in _by_name("rectangle: lines", lines, {"x": 0.3}):
-        checks.one_of("rectangle: lines: axis", axis, ("x", "y"))
+    for axis, line in _by_name("rectangle: lines", lines, {"x": 0.3}):
+        checks.choice("rectangle: lines: axis", axis, ("x", "y"))
         nodes = xs if axis == "x" else ys
-        if not (checks.is_number(place) and 0 < place < nodes[-1] and len(nodes) >= 3):
+        if not (checks.is_number(line) and 0 < line < nodes[-1] and len(nodes) >= 3):
             raise InputError(
-                f"rectangle: lines = {{{axis!r}: {checks.shown(place)}}} mm needs two cells or more in {axis} and a place "
+                f"rectangle: lines = {{{axis!r}: {checks.short(line)}}} mm needs two cells or more in {axis} and a place "
                 f"between 0 and {nodes[-1]:g}"
             )
-        nodes[:] = _shifted(nodes, place)
+        nodes[:] = _shifted(nodes, line)
     return MakeStructured2DMesh(
         quads=not triangles, nx=nx, ny=ny, mapping=lambda s, t: (xs[round(nx * s)], ys[round(ny * t)])
     )
@@ -93,7 +93,7 @@ def box(
     Boundaries: "left" (x = 0) and "right", "front" (y = 0) and "back", "bottom" (z = 0) and "top". `cells` are "hexahedra",
     or two "prisms" (triangles in x and y, extruded in z) or six "tetrahedra" in each. `grade` as in `column`.
     """
-    checks.one_of("box: cells", cells, ("hexahedra", "prisms", "tetrahedra"))
+    checks.choice("box: cells", cells, ("hexahedra", "prisms", "tetrahedra"))
     (width, depth, height), (nx, ny, nz) = _checked_sizes("box", (width, depth, height), (nx, ny, nz))
     sides = (("left", "right"), ("front", "back"), ("bottom", "top"))
     xs, ys, zs = _graded("box", (width, depth, height), (nx, ny, nz), sides, grade)
@@ -123,7 +123,7 @@ def from_occ(shape: Any, maxh: float, order: int = 1, quads: bool = False) -> Me
         mesh = from_occ(disc, maxh=0.5, order=2)
     """
     maxh = checks.positive("from_occ: maxh", maxh, "mm")
-    order = checks.whole("from_occ: order of the curved sides", order, 1, 10)
+    order = checks.integer("from_occ: order of the curved sides", order, 1, 10)
     checks.flag("from_occ: quads", quads)
     checks.instance("from_occ: shape", shape, TopoDS_Shape, "a shape of netgen.occ, such as Rectangle(1.0, 2.0).Face()")
     solid = len(shape.solids) > 0
@@ -167,9 +167,9 @@ def check_mesh(mesh: Mesh) -> None:
             if (found[: len(IntegrationRule(shape, 4))] > round_off).all():
                 fault = "has a corner of 180° or more"
             vertices = [mesh[vertex].point for vertex in mesh[ElementId(VOL, int(bad[0]))].vertices]
-            place = ", ".join(f"{x:.4g}" for x in np.mean(vertices, axis=0))
+            where = place(np.mean(vertices, axis=0))
             raise InputError(
-                f"mesh: cell {bad[0]}, a {name} near ({place}) mm, {fault}"
+                f"mesh: cell {bad[0]}, a {name} near {where} mm, {fault}"
                 f"{f', as {len(bad) - 1} more' if len(bad) > 1 else ''}: move its corners, or mesh the body again"
             )
 
@@ -190,7 +190,7 @@ def check_plane(what: str, heights: NDArray) -> None:
 def _checked_sizes(what: str, sizes: tuple[float, ...], cells: tuple[int, ...]) -> tuple[list[float], list[int]]:
     """Sizes [mm] as floats and numbers of cells as ints, neither beyond what a body can mean or a memory can hold."""
     lengths = [checks.number(f"{what}: size", size, "mm", *SIZES) for size in sizes]
-    numbers = [checks.whole(f"{what}: number of cells", number, 1, MOST_CELLS) for number in cells]
+    numbers = [checks.integer(f"{what}: number of cells", number, 1, MOST_CELLS) for number in cells]
     if prod(numbers) > MOST_CELLS:
         raise InputError(f"{what}: {' × '.join(map(str, numbers))} cells are more than {MOST_CELLS}; take fewer")
     return lengths, numbers
@@ -201,7 +201,7 @@ def _by_name(what: str, values: Any, example: dict[str, float]) -> list[tuple[An
     if values is None:
         return []
     if not isinstance(values, dict):
-        raise InputError(f"{what} has to be a dictionary, such as {example}, got {checks.shown(values)}")
+        raise InputError(f"{what} has to be a dictionary, such as {example}, got {checks.short(values)}")
     return list(values.items())
 
 
@@ -212,7 +212,7 @@ def _graded(
     names = [name for pair in sides for name in pair]
     ratios = dict.fromkeys(names, 1.0)
     for name, ratio in _by_name(f"{what}: grade", grade, {names[-1]: 10.0}):
-        checks.one_of(f"{what}: grade: boundary", name, names)
+        checks.choice(f"{what}: grade: boundary", name, names)
         ratios[name] = checks.number(
             f"{what}: grade at {name!r}", ratio, low=1.0, high=1e6, hint="it is largest over smallest cell"
         )

@@ -9,9 +9,9 @@ from typing import ClassVar
 
 from ngsolve import H1, CoefficientFunction, FESpace, InnerProduct, Mesh, sqrt
 
-from ngswell.baths.bath import Bath, BathFields, Frozen, Lagged, Multiplier, Nitsche, Penalty
-from ngswell.models.model import Setting, Term, check_order, needs_salt
+from ngswell.models.model import BathData, BathFields, FieldContext, check_order, needs_salt
 from ngswell.models.solid_state import SolidState
+from ngswell.models.term import Kind, Term
 from ngswell.physics import donnan, laws
 from ngswell.physics.kinematics import Kinematics
 from ngswell.physics.material import Material
@@ -46,15 +46,15 @@ class State(SolidState):
         """Fluxes from gradients in the `frame` (a matrix on reference gradients): `pull` or `push`."""
         gradient = self.kinematics.flow_gradient
         gradients = (frame * g for g in (self.drive(self.p), gradient(self.c), gradient(self.cfc)))
-        return laws.transport(self.material, self.nF, self.c, self.cfc, *gradients)
+        return laws.transport(self.material, self.J, self.c, self.cfc, *gradients)
 
     def outputs(self) -> dict[str, CoefficientFunction]:
-        """Named fields in the current configuration; `ngswell.models.solid_state.OUTPUT_UNITS` has their units."""
+        """Named fields in the current configuration; `OUTPUT_UNITS` has their units."""
         flux, anions = self.transport(self.push), self.c - self.cfc
         return {
             **self.solid_outputs(self.pore_pressure),
             "p": self.p,
-            "hydraulic_pressure": self.p - self.material.phi * self.material.RT * (self.c + anions),
+            "fluid_potential": self.p - self.material.phi * self.material.RT * (self.c + anions),
             "c_plus": self.c,
             "c_minus": anions,
             "cfc": self.cfc,
@@ -80,34 +80,30 @@ class Concentration:
     order: int = 2
 
     unknowns: ClassVar[tuple[str, ...]] = ("u", "p", "c", "cfc")
-    balances: ClassVar[tuple[str, ...]] = ("momentum", "fluid", "cations", "charge")
-    held: ClassVar[dict[str, str]] = {"fluid": "p", "cations": "c"}
+    balanced: ClassVar[dict[str, str]] = {"fluid": "p", "cations": "c"}
+    charge_field: ClassVar[str | None] = "cfc"
     evolving: ClassVar[dict[str, float]] = {"u": 1e-2, "p": 1e-1, "c": 1e-1}  # cfc follows u
-    treatments: ClassVar[tuple[type, ...]] = (Penalty, Nitsche, Multiplier, Lagged, Frozen)
 
     def __post_init__(self) -> None:
         check_order("Concentration", self.order)
 
-    def default_treatment(self) -> Penalty:
-        return Penalty(relative=1e4)
-
-    def check(self, material: Material, baths: Sequence[Bath]) -> None:
+    def check(self, material: Material, baths: Sequence[BathData]) -> None:
         needs_salt("Concentration", baths)
 
-    def space(self, mesh: Mesh, kinematics: Kinematics, held: dict[str, str], essential: str) -> FESpace:
-        V = kinematics.space(mesh, self.order, held)
+    def space(self, mesh: Mesh, kinematics: Kinematics, fixed: dict[str, str], prescribed: str) -> FESpace:
+        V = kinematics.space(mesh, self.order, fixed)
         Q = H1(mesh, order=self.order - 1)
-        Q_bath = H1(mesh, order=self.order - 1, dirichlet=essential)
+        Q_bath = H1(mesh, order=self.order - 1, dirichlet=prescribed)
         return FESpace([V, Q_bath, Q_bath, Q])
 
-    def state(self, functions: Sequence[CoefficientFunction], setting: Setting) -> State:
-        return State(setting, *functions)
+    def state(self, functions: Sequence[CoefficientFunction], context: FieldContext) -> State:
+        return State(context, *functions)
 
     def equilibrium(self, bath: BathFields, cfc: CoefficientFunction, material: Material) -> dict[str, CoefficientFunction]:
         m = material
         return {
-            "p": donnan.pressure(bath.c, cfc, m.RT, bath.P, m.Gamma, m.phi, m.phi_bath),
-            "c": donnan.cations(bath.c, cfc, m.Gamma),
+            "p": donnan.pressure(bath.salt, cfc, m.RT, bath.P, m.Gamma, m.phi, m.phi_bath),
+            "c": donnan.cations(bath.salt, cfc, m.Gamma),
         }
 
     def terms(self, state: State, tests: Sequence[CoefficientFunction]) -> list[Term]:
@@ -115,12 +111,12 @@ class Concentration:
         s, m = state, state.material
         gradient = s.kinematics.flow_gradient
         flux = s.transport(s.pull)
-        reference_charge = s.setting.charge * (1 - m.nS0) * m.cfc0
+        reference_charge = s.context.charge * (1 - m.nS0) * m.cfc0
         return [
             *s.momentum(s.pore_pressure, v),
-            Term("fluid", "storage", s.content * q, "rate"),
+            Term("fluid", "storage", s.content * q, Kind.RATE),
             Term("fluid", "seepage", -InnerProduct(flux.fluid, gradient(q))),
-            Term("cations", "storage", s.content * s.c * d, "rate"),
+            Term("cations", "storage", s.content * s.c * d, Kind.RATE),
             Term("cations", "diffusion and convection", -InnerProduct(flux.cations, gradient(d))),
             Term("charge", "projection", (s.content * s.cfc - reference_charge) * r),
         ]

@@ -4,52 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import ClassVar
 
 from ngsolve import CoefficientFunction
 
-from ngswell.baths.bath import Bath, BathFields
 from ngswell.errors import InputError
-from ngswell.models.model import Setting
+from ngswell.models.model import BathData, FieldContext
 from ngswell.models.one_pressure import OnePressure
-from ngswell.models.solid_state import SolidState
-from ngswell.physics import donnan, laws
+from ngswell.models.virtual_bath import VirtualBathState
+from ngswell.physics import laws
 from ngswell.physics.material import Material
-from ngswell.schedules import Blend
 
 
 @dataclass(frozen=True)
-class State(SolidState):
-    """Displacement and hydraulic pressure P; the ions follow from the charge at the point and the bath."""
-
-    P: CoefficientFunction
-
-    @property
-    def bath(self) -> BathFields:
-        assert self.setting.bath is not None, "the model refuses scenes without a bath"
-        return self.setting.bath
+class State(VirtualBathState):
+    """Displacement and hydraulic pressure P; the ions follow from the charge at the point and the one bath."""
 
     @property
     def pressure(self) -> CoefficientFunction:
         """What a bath prescribes [N/mm²]."""
         return self.P
-
-    @cached_property
-    def pore_pressure(self) -> CoefficientFunction:
-        """Overall pressure p = P + 2 Rθ [φ sqrt((Γ c̄)² + cfc²/4) − φ̄ c̄], eq. (38) [N/mm²]."""
-        m = self.material
-        return donnan.pressure(self.bath.c, self.pointwise_charge, m.RT, self.P, m.Gamma, m.phi, m.phi_bath)
-
-    @cached_property
-    def cations(self) -> CoefficientFunction:
-        """c₊ of (23)₁ [mol/l]."""
-        return donnan.cations(self.bath.c, self.pointwise_charge, self.material.Gamma)
-
-    @cached_property
-    def anions(self) -> CoefficientFunction:
-        """c₋ = c₊ − cfc [mol/l]."""
-        return donnan.anions(self.bath.c, self.pointwise_charge, self.material.Gamma)
 
     def seepage(self, frame: CoefficientFunction) -> CoefficientFunction:
         """nF wF = −K grad P / (1 + K Rθ cfc² / [nF (D₊ c₊ + D₋ c₋)]) in the `frame` (`pull` or `push`) [mm/s].
@@ -64,16 +38,8 @@ class State(SolidState):
         return -K / (1 + drag) * (frame * self.drive(self.P))
 
     def outputs(self) -> dict[str, CoefficientFunction]:
-        """Named fields in the current configuration; `ngswell.models.solid_state.OUTPUT_UNITS` has their units."""
-        return {
-            **self.solid_outputs(self.pore_pressure),
-            "p": self.pore_pressure,
-            "hydraulic_pressure": self.P - 2 * self.material.phi_bath * self.material.RT * self.bath.c,
-            "c_plus": self.cations,
-            "c_minus": self.anions,
-            "cfc": self.pointwise_charge,
-            "seepage": self.seepage(self.push),
-        }
+        """Named fields in the current configuration; `OUTPUT_UNITS` has their units."""
+        return {**self.ion_outputs(), "seepage": self.seepage(self.push)}
 
 
 @dataclass(frozen=True)
@@ -84,24 +50,26 @@ class LocalDonnan(OnePressure):
     """
 
     unknowns: ClassVar[tuple[str, ...]] = ("u", "P")
-    held: ClassVar[dict[str, str]] = {"fluid": "P"}
+    balanced: ClassVar[dict[str, str]] = {"fluid": "P"}
     evolving: ClassVar[dict[str, float]] = {"u": 1e-2, "P": 1e-1}
 
-    def check(self, material: Material, baths: Sequence[Bath]) -> None:
-        if not baths or any(bath.c is None for bath in baths):
+    def check(self, material: Material, baths: Sequence[BathData]) -> None:
+        if not baths or any(bath.salt is None for bath in baths):
             raise InputError("LocalDonnan needs a bath with its salt concentration c [mol/l]")
         for bath in baths:
-            if isinstance(bath.concentration, Blend):
+            if not bath.salt.uniform:
                 raise InputError(
                     f"bath on {bath.boundary!r}: its concentration varies in space, but LocalDonnan has the ions in "
-                    "equilibrium with one bath; use Concentration"
+                    "equilibrium with one bath; use Potential or Concentration"
                 )
         for bath in baths[1:]:
-            if bath.concentration != baths[0].concentration:
+            if bath.salt != baths[0].salt:
                 raise InputError(
                     f"baths on {baths[0].boundary!r} and {bath.boundary!r} differ in concentration: "
-                    "LocalDonnan has the ions in equilibrium with one bath; use Concentration"
+                    "LocalDonnan has the ions in equilibrium with one bath; use Potential or Concentration"
                 )
 
-    def state(self, functions: Sequence[CoefficientFunction], setting: Setting) -> State:
-        return State(setting, *functions)
+    def state(self, functions: Sequence[CoefficientFunction], context: FieldContext) -> State:
+        assert context.bath is not None, "the model refuses scenes without a bath"
+        u, P = functions
+        return State(context, u, P, context.bath.salt)

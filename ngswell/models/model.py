@@ -1,80 +1,89 @@
-"""A residual as named terms, and what a model offers."""
+"""What a set of unknowns offers, and what its fields live in."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, Literal, Protocol, runtime_checkable
+from typing import Any, ClassVar, NamedTuple, Protocol, runtime_checkable
 
 from ngsolve import CoefficientFunction, FESpace, Mesh
 
 from ngswell import checks
-from ngswell.baths.bath import Bath, BathFields, Treatment
+from ngswell.checks import Field
 from ngswell.errors import InputError
+from ngswell.models.term import Term
 from ngswell.physics.kinematics import Kinematics
-from ngswell.physics.material import Field, Material
-from ngswell.setup.supports import Weight
+from ngswell.physics.material import Material
+
+
+class BathFields(NamedTuple):
+    """A bath in the forms: salt concentration c̄ [mol/l] (None without ions) and hydraulic pressure P̄ [N/mm²]."""
+
+    salt: CoefficientFunction
+    P: CoefficientFunction
+
+
+class BathData(Protocol):
+    """What models check of a bath."""
+
+    @property
+    def boundary(self) -> str: ...
+
+    @property
+    def salt(self) -> Any:
+        """History of its concentration; None for models without ions."""
+        ...
 
 
 @dataclass(frozen=True)
-class Term:
-    """One named term of one balance.
+class FieldContext:
+    """What the fields of a model live in.
 
-    `kind` is "rate" (a content whose time derivative enters), "energy" (a density whose variation enters) or "form" (an
-    integrand linear in the test functions). Integrated over `boundary` if that is named, else over the body. On a boundary,
-    fields have tangential derivatives only, unless the term asks for `normal_derivatives`.
+    Parameters and motion, the factor on cfc0, the specific weight of the fluid [N/mm³] that drives seepage (None where the
+    scene has none), and the first bath.
     """
-
-    balance: str
-    name: str
-    integrand: CoefficientFunction
-    kind: Literal["rate", "energy", "form"] = "form"
-    boundary: str | None = None
-    normal_derivatives: bool = False
-
-    def __str__(self) -> str:
-        return f"{self.balance}: {self.name}" + (f" [{self.boundary}]" if self.boundary else "")
-
-
-@dataclass(frozen=True)
-class Setting:
-    """What the fields of a model live in: parameters and motion, the factor on cfc0, the weight, and the first bath."""
 
     material: Material
     kinematics: Kinematics
     charge: Field
-    weight: Weight | None
+    fluid_weight: tuple[float, ...] | None
     bath: BathFields | None
 
 
 @runtime_checkable
 class Model(Protocol):
-    """A set of unknowns, the first the displacement: spaces, residual, boundary conditions, outputs."""
+    """A set of unknowns, the first the displacement. A model of one's own gives, numbered:
+
+    1. `unknowns`, `order`, `space`: what is solved for;
+    2. `balanced`, `evolving`, `charge_field`, `references`: which unknown balances what, what steps control, natural sizes;
+    3. `check`: its refusals;
+    4. `state`: fields and outputs, of trial functions and of results alike;
+    5. `terms`: the balances over the body;
+    6. `equilibrium`, `excess`: what a bath asks of it;
+    7. `bounds`, `solution_bounds`: what has to stay positive.
+    """
 
     @property
     def order(self) -> int: ...
 
     unknowns: ClassVar[tuple[str, ...]]
-    balances: ClassVar[tuple[str, ...]]
-    held: ClassVar[dict[str, str]]
+    balanced: ClassVar[dict[str, str]]
     """The unknown whose test functions balance what the body holds: {"fluid": "p", ...}."""
     evolving: ClassVar[dict[str, float]]
     """Fields whose time error is controlled, with the fraction of their reference size that the error is relative to
     as long as they have changed by less."""
-    treatments: ClassVar[tuple[type, ...]]
-    """Treatments of a bath that the model knows, its default first."""
+    charge_field: ClassVar[str | None]
+    """The unknown that is a continuous field of the fixed charge; None where the charge is that of the point."""
 
-    def default_treatment(self) -> Treatment: ...
-
-    def check(self, material: Material, baths: Sequence[Bath]) -> None:
+    def check(self, material: Material, baths: Sequence[BathData]) -> None:
         """Refuse materials and baths that the model cannot mean."""
         ...
 
-    def space(self, mesh: Mesh, kinematics: Kinematics, held: dict[str, str], essential: str) -> FESpace:
-        """Product space. `held` maps a direction to boundaries where u vanishes; on `essential` baths prescribe values."""
+    def space(self, mesh: Mesh, kinematics: Kinematics, fixed: dict[str, str], prescribed: str) -> FESpace:
+        """Product space. `fixed` maps a direction to boundaries where u vanishes; on `prescribed` baths prescribe values."""
         ...
 
-    def state(self, functions: Sequence[CoefficientFunction], setting: Setting) -> Any:
+    def state(self, functions: Sequence[CoefficientFunction], context: FieldContext) -> Any:
         """The fields that `functions` (trial functions or components of a result, one an unknown) stand for."""
         ...
 
@@ -103,15 +112,15 @@ class Model(Protocol):
         ...
 
 
-def needs_salt(model: str, baths: Sequence[Bath]) -> None:
+def needs_salt(model: str, baths: Sequence[BathData]) -> None:
     """Refuse baths without a salt concentration."""
     for bath in baths:
-        if bath.c is None:
+        if bath.salt is None:
             raise InputError(f"bath on {bath.boundary!r}: {model} needs its salt concentration c [mol/l]")
 
 
 def check_order(model: str, order: int) -> None:
     """Refuse orders that are not implemented."""
     if not (checks.is_a(order, int) and not isinstance(order, bool) and 2 <= order <= 6):
-        shown = checks.shown(order)
+        shown = checks.short(order)
         raise InputError(f"{model}(order={shown}): order 2 to 6 for u, a whole number; the other unknowns get one less")

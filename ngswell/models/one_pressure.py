@@ -8,8 +8,8 @@ from typing import Any, ClassVar
 
 from ngsolve import H1, CoefficientFunction, FESpace, InnerProduct, Mesh
 
-from ngswell.baths.bath import BathFields, Essential, Penalty
-from ngswell.models.model import Term, check_order
+from ngswell.models.model import BathFields, check_order
+from ngswell.models.term import Kind, Term
 from ngswell.physics.kinematics import Kinematics
 from ngswell.physics.material import Material
 
@@ -23,19 +23,15 @@ class OnePressure:
 
     order: int = 2
 
+    charge_field: ClassVar[str | None] = None
     unknowns: ClassVar[tuple[str, ...]]
-    balances: ClassVar[tuple[str, ...]] = ("momentum", "fluid")
-    treatments: ClassVar[tuple[type, ...]] = (Essential, Penalty)
 
     def __post_init__(self) -> None:
         check_order(type(self).__name__, self.order)
 
-    def default_treatment(self) -> Essential:
-        return Essential()
-
-    def space(self, mesh: Mesh, kinematics: Kinematics, held: dict[str, str], essential: str) -> FESpace:
-        V = kinematics.space(mesh, self.order, held)
-        return FESpace([V, H1(mesh, order=self.order - 1, dirichlet=essential)])
+    def space(self, mesh: Mesh, kinematics: Kinematics, fixed: dict[str, str], prescribed: str) -> FESpace:
+        V = kinematics.space(mesh, self.order, fixed)
+        return FESpace([V, H1(mesh, order=self.order - 1, dirichlet=prescribed)])
 
     def equilibrium(self, bath: BathFields, cfc: CoefficientFunction, material: Material) -> dict[str, CoefficientFunction]:
         return {self.unknowns[1]: bath.P}
@@ -45,7 +41,7 @@ class OnePressure:
         flux = state.seepage(state.pull)
         return [
             *state.momentum(state.pore_pressure, v),
-            Term("fluid", "storage", state.content * q, "rate"),
+            Term("fluid", "storage", state.content * q, Kind.RATE),
             Term("fluid", "seepage", -InnerProduct(flux, state.kinematics.flow_gradient(q))),
         ]
 

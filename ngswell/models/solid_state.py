@@ -2,31 +2,41 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
-from ngsolve import CoefficientFunction, Cof, Det, Id, InnerProduct, Inv
+from ngsolve import CoefficientFunction, Cof, Det, Id, InnerProduct, Inv, Mesh
 
-from ngswell.models.model import Setting, Term
+from ngswell.checks import Field
+from ngswell.errors import InputError
+from ngswell.models.model import FieldContext
+from ngswell.models.term import Kind, Term
 from ngswell.physics import laws
 from ngswell.physics.kinematics import Kinematics
-from ngswell.physics.material import Field, Material
+from ngswell.physics.material import Material
+from ngswell.physics.solid import Deformation, extra_stress
 
 
 @dataclass(frozen=True)
 class SolidState:
     """The deformed solid, of trial functions or of a result. A model adds its fields and `pore_pressure` [N/mm²]."""
 
-    setting: Setting
+    context: FieldContext
     u: CoefficientFunction
 
     @property
     def material(self) -> Material:
-        return self.setting.material
+        return self.context.material
 
     @property
     def kinematics(self) -> Kinematics:
-        return self.setting.kinematics
+        return self.context.kinematics
+
+    @property
+    def mesh(self) -> Mesh:
+        """The mesh of the fields of a result (trial functions have none)."""
+        return self.u.space.mesh
 
     @cached_property
     def F(self) -> CoefficientFunction:
@@ -60,9 +70,21 @@ class SolidState:
         return laws.fluid_content(self.J, self.material)
 
     @cached_property
+    def deformation(self) -> Deformation:
+        """What the solid's law takes; tr C counts the directions in which the motion has no stretch."""
+        F, size = self.F, self.F.dims[0]
+        I1 = InnerProduct(F, F) + (3 - size) if size < 3 else InnerProduct(F, F)
+        return Deformation(self.whole_F, self.J, self.content, I1)
+
+    @cached_property
+    def whole_F(self) -> CoefficientFunction:
+        """Deformation gradient, 3 × 3 in every motion [-]."""
+        return self.kinematics.in_space(self.F)
+
+    @cached_property
     def nF(self) -> CoefficientFunction:
         """Porosity [-]."""
-        return 1 - laws.solidity(self.J, self.material)
+        return laws.porosity(self.J, self.material)
 
     @cached_property
     def permeability(self) -> Field:
@@ -72,36 +94,48 @@ class SolidState:
     @cached_property
     def pointwise_charge(self) -> CoefficientFunction:
         """cfc(J) at the point [mol/l]."""
-        return laws.fixed_charge(self.J, self.material, self.setting.charge)
+        return laws.fixed_charge(self.J, self.material, self.context.charge)
 
     def drive(self, pressure: CoefficientFunction) -> CoefficientFunction:
         """Reference gradient of a pressure, less the pulled-back weight of the fluid [N/mm³]."""
         gradient = self.kinematics.flow_gradient(pressure)
-        if self.setting.weight is None:
+        if self.context.fluid_weight is None:
             return gradient
-        return gradient - self.F.trans * self.kinematics.flow_vector(self.setting.weight.fluid)
+        return gradient - self.F.trans * self.kinematics.flow_vector(self.context.fluid_weight)
 
     def momentum(self, pore_pressure: CoefficientFunction, v: CoefficientFunction) -> list[Term]:
-        """Momentum balance (16) with the extra stress (18) from its energy."""
+        """Momentum balance (16) with the extra stress from the energy of the material's law; loads add their terms."""
         power = InnerProduct(self.cofactor, self.kinematics.gradient(v))
-        terms = [
-            Term("momentum", "solid", laws.solid_energy(self.F, self.material), "energy"),
+        return [
+            Term("momentum", "solid", self.material.solid.energy(self.deformation, self.material), Kind.ENERGY),
             Term("momentum", "pore pressure", -pore_pressure * power),
         ]
-        weight = self.setting.weight
-        if weight is not None:
-            solid, fluid = (CoefficientFunction(vector) for vector in (weight.solid, weight.fluid))
-            force = self.material.nS0 * solid + self.content * fluid
-            terms.append(Term("momentum", "weight", -InnerProduct(force, v)))
-        return terms
+
+    def outputs(self) -> dict[str, CoefficientFunction]:
+        """Named fields in the current configuration; `OUTPUT_UNITS` has their units."""
+        raise NotImplementedError
+
+    def output(self, name: str) -> CoefficientFunction:
+        """One of the outputs. Raises InputError for a name that is none."""
+        outputs = self.outputs()
+        if name not in outputs:
+            raise InputError(f"there is no quantity {name!r}; the model gives {', '.join(outputs)}")
+        return outputs[name]
+
+    def at(self, point: Sequence[float], name: str) -> float | tuple[float, ...]:
+        """An output of a result at a point of the reference configuration [mm], in the unit of `OUTPUT_UNITS`."""
+        mesh = self.mesh
+        if len(point) != mesh.dim or not mesh.Contains(*point):
+            raise InputError(f"{tuple(point)} is not a point of the {mesh.dim}-d body")
+        return self.output(name)(mesh(*point))
 
     def solid_outputs(self, pore_pressure: CoefficientFunction) -> dict[str, CoefficientFunction]:
-        """Displacement, J, nS and total Cauchy stress."""
+        """Displacement, J, nS and total Cauchy stress, 3 × 3 in every motion."""
         return {
             "displacement": self.u,
             "J": self.J,
             "nS": laws.solidity(self.J, self.material),
-            "stress": laws.extra_stress(self.F, self.material) / self.J - pore_pressure * Id(self.F.dims[0]),
+            "stress": extra_stress(self.whole_F, self.material) - pore_pressure * Id(3),
         }
 
 
@@ -111,7 +145,7 @@ OUTPUT_UNITS = {
     "nS": "-",
     "stress": "N/mm²",
     "p": "N/mm²",
-    "hydraulic_pressure": "N/mm²",
+    "fluid_potential": "N/mm²",
     "c_plus": "mol/l",
     "c_minus": "mol/l",
     "cfc": "mol/l",

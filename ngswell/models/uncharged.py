@@ -8,9 +8,8 @@ from typing import ClassVar
 
 from ngsolve import CoefficientFunction
 
-from ngswell.baths.bath import Bath
 from ngswell.errors import InputError
-from ngswell.models.model import Setting
+from ngswell.models.model import BathData, FieldContext
 from ngswell.models.one_pressure import OnePressure
 from ngswell.models.solid_state import SolidState
 from ngswell.physics.material import Material
@@ -37,7 +36,7 @@ class State(SolidState):
         return -self.permeability * (frame * self.drive(self.p))
 
     def outputs(self) -> dict[str, CoefficientFunction]:
-        """Named fields in the current configuration; `ngswell.models.solid_state.OUTPUT_UNITS` has their units."""
+        """Named fields in the current configuration; `OUTPUT_UNITS` has their units."""
         return {**self.solid_outputs(self.p), "p": self.p, "seepage": self.seepage(self.push)}
 
 
@@ -46,17 +45,17 @@ class Uncharged(OnePressure):
     """Unknowns u (order k) and p (order k − 1): the concentration model for cfc0 = 0, whose salt then only drifts along."""
 
     unknowns: ClassVar[tuple[str, ...]] = ("u", "p")
-    held: ClassVar[dict[str, str]] = {"fluid": "p"}
+    balanced: ClassVar[dict[str, str]] = {"fluid": "p"}
     evolving: ClassVar[dict[str, float]] = {"u": 1e-2, "p": 1e-1}
 
-    def check(self, material: Material, baths: Sequence[Bath]) -> None:
+    def check(self, material: Material, baths: Sequence[BathData]) -> None:
         if not isinstance(material.cfc0, (int, float)) or material.cfc0 != 0:
             value = f"{material.cfc0:g}" if isinstance(material.cfc0, (int, float)) else "a field"
-            remedy = "use Concentration or LocalDonnan"
+            remedy = "use Potential, Concentration or LocalDonnan"
             raise InputError(f"Uncharged: the material has cfc0 other than 0 ({value}, mol/l); {remedy}")
         for bath in baths:
-            if bath.c is not None:
+            if bath.salt is not None:
                 raise InputError(f"bath on {bath.boundary!r}: Uncharged has no ions, so it takes no concentration c")
 
-    def state(self, functions: Sequence[CoefficientFunction], setting: Setting) -> State:
-        return State(setting, *functions)
+    def state(self, functions: Sequence[CoefficientFunction], context: FieldContext) -> State:
+        return State(context, *functions)

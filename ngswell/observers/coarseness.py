@@ -10,7 +10,8 @@ from ngsolve import L2, VOL, GridFunction
 from numpy.typing import NDArray
 
 from ngswell.analysis.recovery import Recovery
-from ngswell.errors import InputError
+from ngswell.errors import InputError, place
+from ngswell.files import Tree
 from ngswell.mesh.points import vertices_of
 from ngswell.observers.base import Observer
 from ngswell.problem.problem import Problem
@@ -20,7 +21,6 @@ LARGEST_PART = 1 / 5
 
 ALONG = 1 / 3
 """A boundary is named when the worst cells along it hold at least this share of their squared error."""
-
 
 NOTHING = 1e-6
 """Estimates below this come from Newton's tolerance."""
@@ -51,7 +51,7 @@ class Coarseness(Observer):
 
     def __init__(self, when: float | Sequence[float] | None = None) -> None:
         super().__init__(when)
-        self._mesh: Any = None
+        self._mesh: Any = None  # of the run
         self._sizes: dict[str, float] = {}
         self._totals: dict[str, list[float]] = {}
         self._largest: dict[str, NDArray] = {}
@@ -73,17 +73,13 @@ class Coarseness(Observer):
             self._sizes[name] = max(self._sizes.get(name, 0.0), estimate.sizes[name])
             self._totals.setdefault(name, []).append(float(np.linalg.norm(error)))
 
-    def memory(self) -> dict[str, NDArray]:
-        kept: dict[str, dict] = {"size": self._sizes, "total": self._totals, "largest": self._largest, "at": self._at}
-        return {f"{what}/{name}": np.array(value) for what, of in kept.items() for name, value in of.items()}
+    def state(self) -> Tree:
+        return {"size": self._sizes, "total": self._totals, "largest": self._largest, "at": self._at}
 
-    def remember(self, memory: dict[str, NDArray]) -> None:
-        def of(what: str) -> dict[str, NDArray]:
-            return {key.split("/", 1)[1]: value for key, value in memory.items() if key.startswith(f"{what}/")}
-
-        self._sizes = {name: float(value) for name, value in of("size").items()}
-        self._totals = {name: value.tolist() for name, value in of("total").items()}
-        self._largest, self._at = of("largest"), of("at")
+    def restore(self, state: Tree) -> None:
+        self._sizes = {name: float(value) for name, value in state.get("size", {}).items()}
+        self._totals = {name: value.tolist() for name, value in state.get("total", {}).items()}
+        self._largest, self._at = dict(state.get("largest", {})), dict(state.get("at", {}))
 
     def _relative(self) -> dict[str, NDArray]:
         if not self._largest:
@@ -136,7 +132,7 @@ class Coarseness(Observer):
         return "\n".join(
             [
                 f"Coarseness: the estimated error of a gradient reaches {100 * total[peak]:.2g} % at {self.time[peak]:g} s.",
-                f"Worst cell: {worst.cell} of {len(squares)} at {_text(worst.place)} mm, {worst.time:g} s, "
+                f"Worst cell: {worst.cell} of {len(squares)} at {place(worst.place)} mm, {worst.time:g} s, "
                 f"with {100 * worst.value:.2g} % in {worst.unknown}.",
                 f"Half of the squared error lies in {count} cells{f'; of that along {listed}' if listed else ''}.",
                 advice,
@@ -158,7 +154,3 @@ class Coarseness(Observer):
     def _centre(self, cell: int) -> tuple[float, ...]:
         places = [self._mesh[vertex].point for vertex in list(self._mesh.Elements(VOL))[cell].vertices]
         return tuple(map(float, np.mean(places, axis=0)))
-
-
-def _text(place: tuple[float, ...]) -> str:
-    return f"({', '.join(f'{value:.3g}' for value in place)})"

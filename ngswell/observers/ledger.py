@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import numpy as np
-from ngsolve import BilinearForm
 from numpy.typing import NDArray
 
+from ngswell.files import Tree
 from ngswell.mesh.points import vertices_of
+from ngswell.models.term import Kind, Role
 from ngswell.observers.base import Observer
-from ngswell.problem.problem import Problem, Snapshot
-from ngswell.stepping.stepper import StepReport
+from ngswell.problem.discretisation import Snapshot
+from ngswell.problem.forms import form
+from ngswell.problem.problem import Problem
+from ngswell.stepping.steps import Step
 
 
 class Ledger(Observer):
@@ -32,16 +35,18 @@ class Ledger(Observer):
     def prepare(self, problem: Problem, begin: float, until: float) -> None:
         self._vector = problem.fields.vec.CreateVector()
         self._vertices = {name: slice(r.start, r.start + problem.mesh.nv) for name, r in problem.ranges.items()}
-        self._flows = BilinearForm(problem.space)
-        for term in problem.terms:
-            if term.balance in problem.model.held and term.kind != "rate" and term.name != "efflux":
-                self._flows += problem.integral(term)
+        inner = [
+            term
+            for term in problem.terms
+            if term.balance in problem.model.balanced and term.kind is not Kind.RATE and term.role is not Role.EFFLUX
+        ]
+        self._flows = form(problem, inner)
         self._nodes: dict[tuple[str, str], NDArray] = {}
         taken = np.zeros(problem.mesh.nv, dtype=bool)
-        for bath in problem.scene.baths:
+        for bath in problem.setup.baths:
             mine = np.array([number for number in sorted(vertices_of(problem.mesh, bath.boundary)) if not taken[number]])
             taken[mine] = True
-            for name, unknown in problem.model.held.items():
+            for name, unknown in problem.model.balanced.items():
                 self._nodes[name, bath.boundary] = problem.ranges[unknown].start + mine
         self._left = {key: [0.0] for key in self._nodes}
         self._contents = self._contents_at_nodes(problem)
@@ -57,15 +62,15 @@ class Ledger(Observer):
     def record(self, problem: Problem, time: float) -> None:
         problem.contents(self._vector)
         held = self._vector.FV().NumPy()
-        for name, unknown in problem.model.held.items():
+        for name, unknown in problem.model.balanced.items():
             self._held.setdefault(name, []).append(held[self._vertices[unknown]].sum())
 
-    def observe(self, problem: Problem, report: StepReport) -> None:
+    def observe(self, problem: Problem, step: Step) -> None:
         contents = self._contents_at_nodes(problem)
         gone = {key: self._contents[key] - now for key, now in contents.items()}
         self._contents = contents
-        end = problem.snapshot(report.time)
-        for weight, time, values in problem.stages:
+        end = problem.snapshot(step.time)
+        for weight, time, values in step.stages:
             problem.restore(Snapshot(time, values))
             self._flows.Apply(problem.fields.vec, self._vector)
             for key, flow in self._sums().items():
@@ -73,15 +78,17 @@ class Ledger(Observer):
         problem.restore(end)
         for key, amount in gone.items():
             self._left[key].append(self._left[key][-1] + amount)
-        super().observe(problem, report)
+        super().observe(problem, step)
 
-    def memory(self) -> dict[str, NDArray]:
-        held = {f"held/{name}": np.array(values) for name, values in self._held.items()}
-        return held | {f"left/{name}/{boundary}": np.array(values) for (name, boundary), values in self._left.items()}
+    def state(self) -> Tree:
+        left: Tree = {}
+        for (name, boundary), values in self._left.items():
+            left.setdefault(name, {})[boundary] = np.array(values)
+        return {"held": {name: np.array(values) for name, values in self._held.items()}, "left": left}
 
-    def remember(self, memory: dict[str, NDArray]) -> None:
-        self._held = {key.split("/", 1)[1]: list(values) for key, values in memory.items() if key.startswith("held/")}
-        self._left = {(name, boundary): list(memory[f"left/{name}/{boundary}"]) for name, boundary in self._nodes}
+    def restore(self, state: Tree) -> None:
+        self._held = {name: list(values) for name, values in state["held"].items()}
+        self._left = {(name, boundary): list(state["left"][name][boundary]) for name, boundary in self._nodes}
 
     @property
     def fluid(self) -> NDArray:
@@ -103,10 +110,14 @@ class Ledger(Observer):
         return {boundary: np.array(values) for (kind, boundary), values in self._left.items() if kind == name}
 
     def imbalance(self) -> dict[str, float]:
-        """Largest |held − held₀ + left| over the run, relative to the largest held, of "fluid" and "cations"."""
+        """Largest |held − held₀ + left| over the run, of "fluid" and "cations", relative to the largest held.
+
+        Of a balance that holds nothing, relative to the largest that left; 0 where nothing did.
+        """
         result = {}
         for name, values in self._held.items():
             held = np.array(values)
             gone = sum(self._left_of(name).values(), np.zeros_like(held))
-            result[name] = float(np.abs(held - held[0] + gone).max() / np.abs(held).max())
+            scale = np.abs(held).max() or np.abs(gone).max() or 1.0
+            result[name] = float(np.abs(held - held[0] + gone).max() / scale)
         return result

@@ -6,12 +6,13 @@ import sys
 from time import perf_counter
 
 import numpy as np
-from numpy.typing import NDArray
 from tqdm import tqdm
 
+from ngswell.errors import Reason, Rejection
+from ngswell.files import Tree
 from ngswell.observers.base import Observer
 from ngswell.problem.problem import Problem
-from ngswell.stepping.stepper import StepReport, why
+from ngswell.stepping.steps import Step, why
 
 
 class Progress(Observer):
@@ -24,7 +25,7 @@ class Progress(Observer):
     def prepare(self, problem: Problem, begin: float, until: float) -> None:
         self._begin, self._clock = begin, perf_counter()
         self._reports = self._iterations = 0
-        self._rejected: list[str] = []
+        self._rejected: list[Rejection] = []
         self._reached = begin
         self._bar = tqdm(
             total=until - begin,
@@ -34,22 +35,31 @@ class Progress(Observer):
             bar_format="{desc} {percentage:3.0f}%|{bar}| {n:.0f}/{total:.0f} s simulated [{elapsed}<{remaining}{postfix}]",
         )
 
-    def observe(self, problem: Problem, report: StepReport) -> None:
+    def observe(self, problem: Problem, step: Step) -> None:
         self._reports += 1
-        self._iterations += report.iterations
-        self._rejected += report.rejected
-        self._reached = report.time
-        self._bar.set_postfix_str(f"step {report.dt:.3g} s, {report.iterations} iterations", refresh=False)
-        self._bar.update(report.time - self._begin - self._bar.n)
+        self._iterations += step.iterations
+        self._rejected += step.rejected
+        self._reached = step.time
+        self._bar.set_postfix_str(f"step {step.dt:.3g} s, {step.iterations} iterations", refresh=False)
+        self._bar.update(step.time - self._begin - self._bar.n)
 
-    def memory(self) -> dict[str, NDArray]:
+    def state(self) -> Tree:
         counts = [self._reports, self._iterations, self._reached, perf_counter() - self._clock]
-        return {"counts": np.array(counts), "rejected": np.array(self._rejected, dtype=str)}
+        return {
+            "counts": np.array(counts),
+            "rejected": {
+                "numbers": np.array([(r.dt, r.error) for r in self._rejected]).reshape(-1, 2),
+                "reasons": np.array([r.reason.name for r in self._rejected], dtype=str),
+                "whats": np.array([r.what for r in self._rejected], dtype=str),
+            },
+        }
 
-    def remember(self, memory: dict[str, NDArray]) -> None:
-        *counts, self._reached, seconds = memory["counts"].tolist()
+    def restore(self, state: Tree) -> None:
+        *counts, self._reached, seconds = state["counts"].tolist()
         self._reports, self._iterations = map(int, counts)
-        self._rejected = memory["rejected"].tolist()
+        rejected = state["rejected"]
+        entries = zip(rejected["numbers"].tolist(), rejected["reasons"].tolist(), rejected["whats"].tolist(), strict=True)
+        self._rejected = [Rejection(dt, Reason[name], what, error) for (dt, error), name, what in entries]
         self._clock -= seconds
         self._bar.update(self._reached - self._begin)
 

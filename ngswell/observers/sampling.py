@@ -5,21 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from ngsolve import CF, BoundaryFromVolumeCF, CoefficientFunction, Integrate, Norm
+from ngsolve import CF, BoundaryFromVolumeCF, Integrate, Norm
 from numpy.typing import NDArray
 
 from ngswell import checks
 from ngswell.errors import InputError
+from ngswell.files import Tree
 from ngswell.mesh.points import integral_on_boundary
 from ngswell.observers.base import Observer
-from ngswell.problem.problem import Problem, Snapshot
-
-
-def _output(problem: Problem, name: str) -> CoefficientFunction:
-    outputs = problem.state.outputs()
-    if name not in outputs:
-        raise InputError(f"there is no quantity {name!r}; the model gives {', '.join(outputs)}")
-    return outputs[name]
+from ngswell.problem.discretisation import Snapshot
+from ngswell.problem.problem import Problem
 
 
 class Probe(Observer):
@@ -41,7 +36,7 @@ class Probe(Observer):
     def prepare(self, problem: Problem, begin: float, until: float) -> None:
         if len(self.point) != problem.mesh.dim or not problem.mesh.Contains(*self.point):
             raise InputError(f"Probe: {self.point} is not a point of the {problem.mesh.dim}-d body")
-        self._fields = {name: _output(problem, name) for name in self.quantities}
+        self._fields = {name: problem.state.output(name) for name in self.quantities}
 
     def record(self, problem: Problem, time: float) -> None:
         point = problem.mesh(*self.point)
@@ -53,11 +48,11 @@ class Probe(Observer):
         """Records of each quantity: one row a time."""
         return {name: np.array(rows) for name, rows in self._values.items()}
 
-    def memory(self) -> dict[str, NDArray]:
+    def state(self) -> Tree:
         return self.values
 
-    def remember(self, memory: dict[str, NDArray]) -> None:
-        self._values = {name: list(memory[name]) for name in self.quantities}
+    def restore(self, state: Tree) -> None:
+        self._values = {name: list(state[name]) for name in self.quantities}
 
 
 class Integral(Observer):
@@ -77,12 +72,12 @@ class Integral(Observer):
         self._values: list = []
 
     def prepare(self, problem: Problem, begin: float, until: float) -> None:
-        quantity = CF(1.0) if self.quantity is None else _output(problem, self.quantity)
+        quantity = CF(1.0) if self.quantity is None else problem.state.output(self.quantity)
         weight = problem.kinematics.weight
         if self.boundary is None:
             self._density = (quantity * problem.state.J * weight).Compile()
         else:
-            problem.scene.check_boundary("Integral", self.boundary)
+            problem.setup.check_boundary("Integral", self.boundary)
             cofactor = BoundaryFromVolumeCF(problem.state.cofactor)
             self._quantity, self._measure = quantity, Norm(cofactor * problem.kinematics.normal) * weight
 
@@ -98,11 +93,11 @@ class Integral(Observer):
         """Records, one row a time; the quantity's unit times mm (1-d, or a boundary in 2-d), mm² or mm³."""
         return np.array(self._values)
 
-    def memory(self) -> dict[str, NDArray]:
+    def state(self) -> Tree:
         return {"values": self.values}
 
-    def remember(self, memory: dict[str, NDArray]) -> None:
-        self._values = list(memory["values"])
+    def restore(self, state: Tree) -> None:
+        self._values = list(state["values"])
 
 
 class Area(Integral):
@@ -113,7 +108,7 @@ class Area(Integral):
 
 
 class Snapshots(Observer):
-    """Whole states at the given times, for pictures (`Problem.restore`) and for runs that go on from them."""
+    """Whole states at the given times, for pictures (`scene.state`) and for runs that go on from them."""
 
     def __init__(self, when: Sequence[float]) -> None:
         super().__init__(when)
@@ -122,8 +117,8 @@ class Snapshots(Observer):
     def record(self, problem: Problem, time: float) -> None:
         self.states.append(problem.snapshot(time))
 
-    def memory(self) -> dict[str, NDArray]:
+    def state(self) -> Tree:
         return {"values": np.array([state.values for state in self.states])}
 
-    def remember(self, memory: dict[str, NDArray]) -> None:
-        self.states = [Snapshot(time, values) for time, values in zip(self._recorded, memory["values"], strict=True)]
+    def restore(self, state: Tree) -> None:
+        self.states = [Snapshot(time, values) for time, values in zip(self._recorded, state["values"], strict=True)]

@@ -9,9 +9,10 @@ from math import inf
 import numpy as np
 from numpy.typing import NDArray
 
-from ngswell.analysis.stability import Instability, Perturbations
-from ngswell.baths.bath import Lagged
-from ngswell.errors import REMEDY, InputError, InstabilityError
+from ngswell.analysis.perturbations import Instability, Perturbations
+from ngswell.baths.treatment import Charge
+from ngswell.errors import REMEDIES, InputError, InstabilityError, Reason
+from ngswell.files import Tree
 from ngswell.observers.base import Observer
 from ngswell.problem.problem import Problem
 
@@ -51,21 +52,25 @@ class Stability(Observer):
         return np.array(self._rates)
 
     def prepare(self, problem: Problem, begin: float, until: float) -> None:
-        for bath in problem.scene.baths:
-            if isinstance(problem.scene.treatment(bath), Lagged):
+        for bath, treatment in problem.setup.prescribed_baths:
+            if treatment.charge_of is Charge.LAST_STEP:
                 raise InputError(
-                    f"Stability: the bath on {bath.boundary!r} is Lagged, a condition that looks back one step; "
-                    "ngswell.analysis.stability.growth_factor tells what a step does to a perturbation"
+                    f"Stability: the bath on {bath.boundary!r} looks back one step ({treatment}); "
+                    "scene.growth_factor(dt) tells what a step does to a perturbation"
                 )
+        if self.over is None and not begin < until:
+            raise InputError(
+                "Stability: a state of rest has no duration; say over how long growth counts, Stability(over=1e6)"
+            )
         self._slowest = 1 / (until - begin if self.over is None else self.over)
         self._perturbations = Perturbations(problem)
         self._begin, self._stopped = begin, False
 
-    def memory(self) -> dict[str, NDArray]:
+    def state(self) -> Tree:
         return {"rates": self.rates}
 
-    def remember(self, memory: dict[str, NDArray]) -> None:
-        self._rates = memory["rates"].tolist()
+    def restore(self, state: Tree) -> None:
+        self._rates = state["rates"].tolist()
 
     def record(self, problem: Problem, time: float) -> None:
         before = self._rates[-1] if self._rates else 0.0
@@ -78,12 +83,12 @@ class Stability(Observer):
         lost = stage > 0 and found.rate * stage > FOLLOWED
         if lost or not self.follow:
             self._stopped = True
-            reason = f"the state at t = {time:.10g} s is unstable: {found}."
-            if lost:
-                reason += f" Stages of {stage:.3g} s do not follow that."
-            raise InstabilityError(time, stage, found.where, found.rate, found.wavelength, reason)
+            raise InstabilityError(time, stage, found.where, found.rate, found.wavelength, str(found), lost)
 
     def finish(self, problem: Problem) -> None:
         if self._rates and self._rates[-1] > 0 and not self._stopped and self.last:
             at = f"t = {self._recorded[-1]:.10g} s"
-            warnings.warn(f"Stability: the last state looked at, {at}, is unstable: {self.last}. {REMEDY}", stacklevel=2)
+            warnings.warn(
+                f"Stability: the last state looked at, {at}, is unstable: {self.last}. {REMEDIES[Reason.UNSTABLE]}",
+                stacklevel=2,
+            )

@@ -9,11 +9,10 @@ from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
 from ngsolve import CF, CoefficientFunction, VTKOutput
-from numpy.typing import NDArray
 
 from ngswell import checks
 from ngswell.errors import InputError, OutputError
-from ngswell.files import check_folder, replacing
+from ngswell.files import Tree, check_folder, replacing
 from ngswell.observers.base import Observer
 from ngswell.problem.problem import Problem
 
@@ -38,10 +37,10 @@ class VTK(Observer):
     ) -> None:
         super().__init__(when, str(path), *quantities)
         if not isinstance(path, (str, os.PathLike)) or not Path(path).name:
-            raise InputError(f"VTK: path has to name the series, such as 'out/swelling', got {checks.shown(path)}")
+            raise InputError(f"VTK: path has to name the series, such as 'out/swelling', got {checks.short(path)}")
         for quantity in quantities:
             checks.name("VTK: a quantity", quantity, "displacement")
-        subdivision = checks.whole("VTK: subdivision", subdivision, 0, 5)
+        subdivision = checks.integer("VTK: subdivision", subdivision, 0, 5)
         checks.flag("VTK: overwrite", overwrite)
         self.path, self.quantities, self.subdivision, self.overwrite = Path(path), quantities, subdivision, overwrite
 
@@ -50,8 +49,7 @@ class VTK(Observer):
             raise InputError("VTK: NGSolve writes no 1-d meshes; watch a column with Probe, or run it as a strip")
         outputs = problem.state.outputs()
         for name in self.quantities:
-            if name not in outputs:
-                raise InputError(f"VTK: there is no quantity {name!r}; the model gives {', '.join(outputs)}")
+            problem.state.output(name)
         names = list(self.quantities or outputs)
         if "displacement" not in names:
             names.append("displacement")
@@ -69,10 +67,10 @@ class VTK(Observer):
             file.unlink()
         self._record_if_due(problem, begin)
 
-    def memory(self) -> dict[str, NDArray]:
+    def state(self) -> Tree:
         return {}  # the pieces are on the disk
 
-    def remember(self, memory: dict[str, NDArray]) -> None:
+    def restore(self, state: Tree) -> None:
         for number in range(len(self._recorded)):
             if not self._piece(number).is_file():
                 raise InputError(f"VTK: {self._piece(number)}, written before the checkpoint, is missing; put it back")
@@ -112,10 +110,7 @@ def _complete(piece: Path) -> bool:
 
 
 def _three_dimensional(field: CoefficientFunction) -> CoefficientFunction:
-    shape = tuple(field.dims)
-    if not shape:
+    """Vectors along the motion with the zeros that they have across it; tensors are 3 × 3 as they are."""
+    if len(field.dims) != 1:
         return field
-    if len(shape) == 1:
-        return CF(tuple(field[i] for i in range(shape[0])) + (0.0,) * (3 - shape[0]))
-    rows = [[field[i, j] if i < shape[0] and j < shape[1] else CF(0.0) for j in range(3)] for i in range(3)]
-    return CF(tuple(entry for row in rows for entry in row), dims=(3, 3))
+    return CF(tuple(field[i] for i in range(field.dims[0])) + (0.0,) * (3 - field.dims[0]))

@@ -13,24 +13,24 @@ from numpy.typing import NDArray
 Value = TypeVar("Value", float, NDArray, CoefficientFunction)
 
 
-def cations(bath: Value, cfc: Value, Gamma: float = 1.0) -> Value:
+def cations(salt: Value, cfc: Value, Gamma: float = 1.0) -> Value:
     """Cation concentration in equilibrium with a bath, c_D = sqrt((Γ c̄)² + cfc²/4) + cfc/2, eq. (23)₁ [mol/l].
 
-    `bath` is the salt concentration c̄ [mol/l], `cfc` the fixed charge per fluid volume [mol/l], `Gamma` the mean activity
+    `salt` is the bath's concentration c̄ [mol/l], `cfc` the fixed charge per fluid volume [mol/l], `Gamma` the mean activity
     coefficient of the salt in the bath over that in the gel: equal activities are c₊ c₋ = (Γ c̄)². The paper has Γ = 1; its
     (32) as printed swaps the ¼ and the ½.
     """
-    return _root(bath, cfc, Gamma) + cfc / 2
+    return _root(salt, cfc, Gamma) + cfc / 2
 
 
-def anions(bath: Value, cfc: Value, Gamma: float = 1.0) -> Value:
+def anions(salt: Value, cfc: Value, Gamma: float = 1.0) -> Value:
     """Anion concentration c₋ = (Γ c̄)² / c_D [mol/l]; the quotient keeps its digits where c_D − cfc would lose them."""
-    salt = _times(Gamma, bath)
-    return salt * salt / cations(bath, cfc, Gamma)
+    active = _times(Gamma, salt)
+    return active * active / cations(salt, cfc, Gamma)
 
 
 def pressure(
-    bath: Value,
+    salt: Value,
     cfc: Value,
     RT: float,
     hydraulic: Value | float = 0.0,
@@ -43,13 +43,13 @@ def pressure(
     `RT` is Rθ [N/mm² per mol/l], `hydraulic` the bath's hydraulic pressure P̄ [N/mm²], `phi` and `phi_bath` the osmotic
     coefficients of the pore fluid and of the bath, 1 in the paper.
     """
-    return hydraulic + 2 * RT * (_times(phi, _root(bath, cfc, Gamma)) - _times(phi_bath, bath))
+    return hydraulic + 2 * RT * (_times(phi, _root(salt, cfc, Gamma)) - _times(phi_bath, salt))
 
 
-def _root(bath: Value, cfc: Value, Gamma: float) -> Value:
+def _root(salt: Value, cfc: Value, Gamma: float) -> Value:
     """(c₊ + c₋)/2 [mol/l]."""
-    salt = _times(Gamma, bath)
-    return sqrt(salt * salt + cfc * cfc / 4)
+    active = _times(Gamma, salt)
+    return sqrt(active * active + cfc * cfc / 4)
 
 
 def _times(factor: float, value: Value) -> Value:

@@ -18,18 +18,26 @@ from ngswell.mesh.points import vertices, vertices_of
 class Kinematics(Protocol):
     """The displacement's part of a scene. `directions` names its components, as supports do.
 
-    Tensors are as large as the motion needs: 1 × 1 confined, 2 × 2 in plane strain, 3 × 3 otherwise.
+    Tensors are as large as the motion needs: 1 × 1 confined, 2 × 2 in plane strain, 3 × 3 otherwise; `in_space` makes a
+    deformation gradient whole. A motion of one's own gives, numbered:
+
+    1. `dimension` of its meshes, `directions`, and `check`, its refusals;
+    2. `space`, `gradient`: the displacement and its gradient;
+    3. `flow_gradient`, `flow_vector`: gradients of pressures and vectors of the scene, as long as its tensors are wide;
+    4. `in_space`: F as 3 × 3;
+    5. `weight`, `normal`, `area_vector`, `area_stretch`: measures of the body and its boundary;
+    6. `rigid_motions`: what supports have to hold.
     """
 
     dimension: int
     directions: str
 
-    def check(self, mesh: Mesh, held: dict[str, str]) -> None:
-        """Refuse meshes on which the kinematics has no meaning; `held` maps directions to boundaries ("a|b")."""
+    def check(self, mesh: Mesh, fixed: dict[str, str]) -> None:
+        """Refuse meshes on which the kinematics has no meaning; `fixed` maps directions to boundaries ("a|b")."""
         ...
 
-    def space(self, mesh: Mesh, order: int, held: dict[str, str]) -> FESpace:
-        """Displacement space; `held` maps a direction to the boundaries ("a|b") where it vanishes."""
+    def space(self, mesh: Mesh, order: int, fixed: dict[str, str]) -> FESpace:
+        """Displacement space; `fixed` maps a direction to the boundaries ("a|b") where it vanishes."""
         ...
 
     def gradient(self, u: CoefficientFunction) -> CoefficientFunction:
@@ -54,6 +62,14 @@ class Kinematics(Protocol):
         """Outer normal N of the reference configuration, as long as the tensors are wide."""
         ...
 
+    def in_space(self, F: CoefficientFunction) -> CoefficientFunction:
+        """The whole deformation gradient, 3 × 3: out of the motion's plane or line there is no stretch."""
+        ...
+
+    def area_vector(self, u: CoefficientFunction) -> CoefficientFunction:
+        """n da/dA = Cof(F) N on a boundary [-], along `directions`; u is a trial function."""
+        ...
+
     def area_stretch(self, u: CoefficientFunction) -> CoefficientFunction:
         """da/dA = |Cof(F) N| on a boundary [-]; u is a trial function."""
         ...
@@ -75,11 +91,11 @@ class Confined:
     def normal(self) -> CoefficientFunction:
         return specialcf.normal(1)
 
-    def check(self, mesh: Mesh, held: dict[str, str]) -> None:
+    def check(self, mesh: Mesh, fixed: dict[str, str]) -> None:
         pass
 
-    def space(self, mesh: Mesh, order: int, held: dict[str, str]) -> FESpace:
-        return H1(mesh, order=order, dirichlet=held["x"])
+    def space(self, mesh: Mesh, order: int, fixed: dict[str, str]) -> FESpace:
+        return H1(mesh, order=order, dirichlet=fixed["x"])
 
     def gradient(self, u: CoefficientFunction) -> CoefficientFunction:
         return CF(grad(u), dims=(1, 1))
@@ -89,6 +105,12 @@ class Confined:
 
     def flow_vector(self, components: tuple[float, ...]) -> CoefficientFunction:
         return CF(components)
+
+    def in_space(self, F: CoefficientFunction) -> CoefficientFunction:
+        return CF((F[0, 0], 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0), dims=(3, 3))
+
+    def area_vector(self, u: CoefficientFunction) -> CoefficientFunction:
+        return self.normal[0]
 
     def area_stretch(self, u: CoefficientFunction) -> CoefficientFunction:
         return CF(1.0)
@@ -104,11 +126,11 @@ class _Cartesian:
     directions: str
     weight = 1.0
 
-    def check(self, mesh: Mesh, held: dict[str, str]) -> None:
+    def check(self, mesh: Mesh, fixed: dict[str, str]) -> None:
         pass
 
-    def space(self, mesh: Mesh, order: int, held: dict[str, str]) -> FESpace:
-        return VectorH1(mesh, order=order, **_vanishing(held.values()))
+    def space(self, mesh: Mesh, order: int, fixed: dict[str, str]) -> FESpace:
+        return VectorH1(mesh, order=order, **_vanishing(fixed.values()))
 
     def gradient(self, u: CoefficientFunction) -> CoefficientFunction:
         return Grad(u)
@@ -123,9 +145,12 @@ class _Cartesian:
     def normal(self) -> CoefficientFunction:
         return specialcf.normal(self.dimension)
 
-    def area_stretch(self, u: CoefficientFunction) -> CoefficientFunction:
+    def area_vector(self, u: CoefficientFunction) -> CoefficientFunction:
         # Cof(F) N needs tangential derivatives only, which the trace has.
-        return Norm(Cof(Id(self.dimension) + Grad(u).Trace()) * self.normal)
+        return Cof(Id(self.dimension) + Grad(u).Trace()) * self.normal
+
+    def area_stretch(self, u: CoefficientFunction) -> CoefficientFunction:
+        return Norm(self.area_vector(u))
 
 
 @dataclass(frozen=True)
@@ -135,17 +160,23 @@ class PlaneStrain(_Cartesian):
     dimension = 2
     directions = "xy"
 
+    def in_space(self, F: CoefficientFunction) -> CoefficientFunction:
+        return CF((F[0, 0], F[0, 1], 0.0, F[1, 0], F[1, 1], 0.0, 0.0, 0.0, 1.0), dims=(3, 3))
+
     def rigid_motions(self, point: NDArray) -> NDArray:
         px, py = point
         return np.array([[1.0, 0.0, -py], [0.0, 1.0, px]])
 
 
 @dataclass(frozen=True)
-class Solid(_Cartesian):
+class Spatial(_Cartesian):
     """Three displacement components on a 3-d mesh."""
 
     dimension = 3
     directions = "xyz"
+
+    def in_space(self, F: CoefficientFunction) -> CoefficientFunction:
+        return F
 
     def rigid_motions(self, point: NDArray) -> NDArray:
         px, py, pz = point
@@ -162,18 +193,18 @@ class Axisymmetric:
     dimension = 2
     directions = "rz"
 
-    def check(self, mesh: Mesh, held: dict[str, str]) -> None:
+    def check(self, mesh: Mesh, fixed: dict[str, str]) -> None:
         radii = vertices(mesh)[:, 0]
         inner, size = radii.min(), radii.max()
         if inner < -1e-12 * abs(size):
             raise InputError(f"Axisymmetric: the mesh crosses the axis, its first coordinate r falls to {inner:g} mm")
         on_axis = set(np.flatnonzero(radii <= 1e-12 * size))
-        fixed = vertices_of(mesh, held["r"]) if held["r"] else set()
-        if on_axis - fixed:
+        on_support = vertices_of(mesh, fixed["r"]) if fixed["r"] else set()
+        if on_axis - on_support:
             raise InputError("Axisymmetric: the mesh touches the axis r = 0; hold it there, Roller(boundary, 'r')")
 
-    def space(self, mesh: Mesh, order: int, held: dict[str, str]) -> FESpace:
-        return VectorH1(mesh, order=order, **_vanishing(held.values()))
+    def space(self, mesh: Mesh, order: int, fixed: dict[str, str]) -> FESpace:
+        return VectorH1(mesh, order=order, **_vanishing(fixed.values()))
 
     def gradient(self, u: CoefficientFunction) -> CoefficientFunction:
         return _with_hoop(Grad(u), u)
@@ -193,8 +224,18 @@ class Axisymmetric:
         components = specialcf.normal(2)
         return CF((components[0], components[1], 0.0))
 
+    def in_space(self, F: CoefficientFunction) -> CoefficientFunction:
+        return F
+
+    def area_vector(self, u: CoefficientFunction) -> CoefficientFunction:
+        vector = self._area_vector(u)
+        return CF((vector[0], vector[1]))
+
     def area_stretch(self, u: CoefficientFunction) -> CoefficientFunction:
-        return Norm(Cof(Id(3) + _with_hoop(Grad(u).Trace(), u)) * self.normal)
+        return Norm(self._area_vector(u))
+
+    def _area_vector(self, u: CoefficientFunction) -> CoefficientFunction:
+        return Cof(Id(3) + _with_hoop(Grad(u).Trace(), u)) * self.normal
 
     def rigid_motions(self, point: NDArray) -> NDArray:
         return np.array([[0.0], [1.0]])

@@ -1,22 +1,28 @@
-"""Constitutive laws: functions of the state, one equation each. All take NGSolve fields (trial functions or results).
+"""Pore fluid, charge and ions: functions of the state, one equation each, of NGSolve fields (trial functions or results).
 
-F is the deformation gradient, J its determinant, nF the porosity, c the cation concentration and cfc the fixed charge per
-fluid volume. Fluxes are linear in the gradients they are given, so they come out in the frame the gradients are in.
+J is the volume ratio, c the cation concentration and cfc the fixed charge per fluid volume. Fluxes are linear in the
+gradients they are given, so they come out in the frame the gradients are in.
 """
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
-from ngsolve import CoefficientFunction, Det, Id, InnerProduct, log
+from ngsolve import CoefficientFunction
 
+from ngswell.checks import Field
 from ngswell.physics import donnan
-from ngswell.physics.material import Field, Material
+from ngswell.physics.material import Material
 
 
 def solidity(J: CoefficientFunction, material: Material) -> CoefficientFunction:
     """nS = nS0 / J, eq. (13)₁ [-]."""
     return material.nS0 / J
+
+
+def porosity(J: CoefficientFunction, material: Material) -> CoefficientFunction:
+    """nF = 1 − nS, eq. (1) [-]."""
+    return 1 - solidity(J, material)
 
 
 def fluid_content(J: CoefficientFunction, material: Material) -> CoefficientFunction:
@@ -27,23 +33,6 @@ def fluid_content(J: CoefficientFunction, material: Material) -> CoefficientFunc
 def fixed_charge(J: CoefficientFunction, material: Material, charge: Field = 1.0) -> CoefficientFunction:
     """cfc = (1 − nS0) cfc0 / (J − nS0), eq. (13)₂ [mol/l]; `charge` scales cfc0."""
     return charge * (1 - material.nS0) * material.cfc0 / fluid_content(J, material)
-
-
-def solid_energy(F: CoefficientFunction, material: Material) -> CoefficientFunction:
-    """Energy of the extra stress (18) per reference volume [N/mm²].
-
-    ψ = µ/2 tr C − µ ln J + λ (1 − nS0)² [J/(1 − nS0) − ln(J − nS0)]: neo-Hookean, with a pole at the compression point
-    J = nS0. In plane strain and in confined motion the omitted directions add a constant.
-    """
-    J, m = Det(F), material
-    volumetric = m.lam * (1 - m.nS0) ** 2 * (J / (1 - m.nS0) - log(J - m.nS0))
-    return m.mu / 2 * InnerProduct(F, F) - m.mu * log(J) + volumetric
-
-
-def extra_stress(F: CoefficientFunction, material: Material) -> CoefficientFunction:
-    """Kirchhoff extra stress τ = µ (B − I) + λ (1 − nS0)² [J/(1 − nS0) − J/(J − nS0)] I, eq. (18) [N/mm²]."""
-    J, m, one = Det(F), material, Id(F.dims[0])
-    return m.mu * (F * F.trans - one) + m.lam * (1 - m.nS0) ** 2 * (J / (1 - m.nS0) - J / (J - m.nS0)) * one
 
 
 def permeability(J: CoefficientFunction, material: Material) -> Field:
@@ -66,15 +55,15 @@ class Transport(NamedTuple):
 
 def transport_by_potentials(
     material: Material,
-    nF: CoefficientFunction,
-    bath: CoefficientFunction,
+    J: CoefficientFunction,
+    salt: CoefficientFunction,
     cfc: CoefficientFunction,
     drive: CoefficientFunction,
-    grad_bath: CoefficientFunction,
+    grad_salt: CoefficientFunction,
 ) -> Transport:
     """The same fluxes, (19) to (22), from the gradients of the virtual bath (P, c̃) in equilibrium with the point.
 
-    `bath` is c̃, `drive` is grad P (less the fluid's weight). With the electrochemical potentials over Rθ, grad µ₊ + grad µ₋
+    `salt` is c̃, `drive` is grad P (less the fluid's weight). With the electrochemical potentials over Rθ, grad µ₊ + grad µ₋
     = 2 grad ln c̃, and zero current for grad µ₊,
 
         nF wF     = −K [grad P − 2 φ̄ Rθ grad c̃ + Rθ (cfc grad µ₊ + 2 c₋ grad ln c̃)]
@@ -83,14 +72,14 @@ def transport_by_potentials(
 
     c₋ grad ln c̃ = (Γ²c̃/c₊) grad c̃ has no pole at c̃ = 0. Θ, D_L as in `transport`.
     """
-    m, RT = material, material.RT
-    K = permeability(m.nS0 / (1 - nF), m)
+    m, RT, nF = material, material.RT, porosity(J, material)
+    K = permeability(J, m)
     D_plus, D_minus = diffusivities(nF, m)
-    plus, minus = donnan.cations(bath, cfc, m.Gamma), donnan.anions(bath, cfc, m.Gamma)
+    plus, minus = donnan.cations(salt, cfc, m.Gamma), donnan.anions(salt, cfc, m.Gamma)
     D_L = cfc * K * RT / nF
     conductance = D_plus * plus + D_minus * minus + D_L * cfc
-    of_fluid = drive - 2 * m.phi_bath * RT * grad_bath
-    of_anions = (m.Gamma**2 * bath / plus) * grad_bath  # c₋ grad ln c̃
+    of_fluid = drive - 2 * m.phi_bath * RT * grad_salt
+    of_anions = (m.Gamma**2 * salt / plus) * grad_salt  # c₋ grad ln c̃
     of_cations = (2 * (D_minus - D_L) * of_anions - D_L / RT * of_fluid) / conductance  # grad µ₊
     fluid = -K * (of_fluid + RT * (cfc * of_cations + 2 * of_anions))
     cations = -nF * D_plus * plus * of_cations + plus * fluid
@@ -100,7 +89,7 @@ def transport_by_potentials(
 
 def transport(
     material: Material,
-    nF: CoefficientFunction,
+    J: CoefficientFunction,
     c: CoefficientFunction,
     cfc: CoefficientFunction,
     drive: CoefficientFunction,
@@ -122,8 +111,8 @@ def transport(
     non-uniform charge would not come to rest. (20) is taken with the porosity that D_L in (22) needs; ion saturations
     are zero. K and D± are those of the material's laws.
     """
-    RT = material.RT
-    K = permeability(material.nS0 / (1 - nF), material)
+    RT, nF = material.RT, porosity(J, material)
+    K = permeability(J, material)
     D_plus, D_minus = diffusivities(nF, material)
     if material.phi != 1:
         drive = drive + (1 - material.phi) * RT * (2 * grad_c - grad_cfc)

@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Sequence
+from typing import Any
 
 from numpy.typing import NDArray
 
 from ngswell import checks
-from ngswell.analysis.diagnosis import UNDETERMINED, singular_mode
-from ngswell.baths.bath import Frozen, Lagged
-from ngswell.errors import InputError, StepError
-from ngswell.problem.problem import Problem, Snapshot
+from ngswell.analysis.diagnosis import singular_mode
+from ngswell.baths.treatment import Charge
+from ngswell.errors import UNCONVERGED, Failure, InputError, StepError
+from ngswell.observers.base import Observer
+from ngswell.problem.discretisation import Snapshot
+from ngswell.problem.problem import Problem
+from ngswell.run.watch import Watch
 from ngswell.schedules import LARGEST
+from ngswell.setup.setup import Setup
 from ngswell.solve.direct import LinearSolver, solver_of
-from ngswell.solve.newton import LOST, Newton, Outcome
-
-if TYPE_CHECKING:
-    from ngswell.scene import Scene
+from ngswell.solve.factorisation import Factorisation
+from ngswell.solve.newton import DampedNewton, Outcome
 
 SMALLEST_SHARE = 1e-4
 """Continuation gives up below this share of the charge."""
@@ -30,89 +32,97 @@ SHORTEST = 1e-12
 
 
 def equilibrate(
-    scene: Scene,
+    setup: Setup,
     time: float | None = None,
-    newton: Newton | None = None,
-    make_solver: Callable[[Problem], LinearSolver] = solver_of,
+    newton: DampedNewton | None = None,
+    solver: Callable[[Problem], LinearSolver] = solver_of,
+    observers: Sequence[Observer | Callable[[float, Any], object]] = (),
 ) -> Snapshot:
-    """The state in which the scene comes to rest when its charge and baths stay as they are at `time` [s] (its start).
+    """The state in which the setup comes to rest when its charge and baths stay as they are at `time` [s] (its start).
 
     The stationary balances are solved by continuation: from the uncharged body, already loaded, the charge is raised as
     fast as Newton's method follows. Where that ends early, as under a load that only the charged body can bear, the body
     relaxes from its initial state instead, in steps of backward Euler that grow as fast as Newton's method follows. Works
-    for fields of position and constrained bodies. Raises InputError for a sealed body (what it holds is not determined by
-    balances) and for treatments that remember the past, and StepError when neither way reaches the state of rest; the fields
-    then hold the scene's initial state.
+    for fields of position and constrained bodies. `observers` record the state of rest. Raises InputError for a sealed body
+    (what it holds is not determined by balances) and for treatments that remember the past, and StepError when neither way
+    reaches the state of rest; `end` of the error is the initial state.
     """
-    time = scene.start if time is None else checks.number("equilibrate: time", time, "s", -LARGEST, LARGEST)
-    if not scene.baths:
+    time = setup.start if time is None else checks.number("equilibrate: time", time, "s", -LARGEST, LARGEST)
+    if not setup.baths:
         raise InputError("equilibrate: the body is sealed, so its content at rest is not determined; give it a bath")
-    for bath in scene.baths:
-        if isinstance(scene.treatment(bath), (Lagged, Frozen)):
-            raise InputError(f"equilibrate: the bath on {bath.boundary!r} remembers the past ({scene.treatment(bath)})")
-    problem, method = scene.problem, newton or Newton()
-    solver = make_solver(problem)
-    failure = _raise_charge(problem, time, method, solver)
-    if failure and _relax(problem, time, method, solver):
-        problem.initialise()
-        raise failure
+    for bath, treatment in setup.prescribed_baths:
+        if treatment.charge_of is not Charge.PRESENT:
+            raise InputError(f"equilibrate: the bath on {bath.boundary!r} remembers the past ({treatment})")
+    watch, problem, method = Watch(observers), Problem(setup), newton or DampedNewton()
+    watch.plan(time, time)
+    rest = _Rest(problem, time, method, Factorisation(solver(problem), method.slowest))
+    failed = rest.raise_charge()
+    if failed is not None and not rest.relax():
+        raise failed
     problem.set_time(time)
+    with watch:
+        watch.start(problem, time, time, time)
     return problem.snapshot(time)
 
 
-def _raise_charge(problem: Problem, time: float, newton: Newton, solver: LinearSolver) -> StepError | None:
-    """Continuation from the uncharged body; the fields hold the state of rest unless there is something to raise."""
-    problem.initialise(charge_share=0.0)
+class _Rest:
+    """The two ways to the state of rest at a time."""
 
-    def solve(share: float, guess: NDArray) -> Outcome:
-        problem.begin_step(time, STATIONARY, guess, charge_share=share)
-        return newton.solve(problem, solver)
+    def __init__(self, problem: Problem, time: float, newton: DampedNewton, factorisation: Factorisation) -> None:
+        self.problem, self.time, self.newton, self.factorisation = problem, time, newton, factorisation
 
-    outcome = solve(0.0, problem.vector.copy())
-    if outcome.reason is not None:
-        return _give_up(problem, 0.0, outcome)
-    step, reached = 1.0, [(0.0, problem.vector.copy())]
-    while reached[-1][0] < 1.0:
-        share, state = reached[-1]
-        target = min(1.0, share + step)
-        guess = state
-        if len(reached) > 1:
-            earlier, old = reached[-2]
-            guess = state + (target - share) / (share - earlier) * (state - old)
-        outcome = solve(target, guess)
-        if outcome.reason is None:
-            reached = [(share, state), (target, problem.vector.copy())]
-            step *= 2
-            continue
-        problem.vector[:] = state
-        step /= 4
-        if step < SMALLEST_SHARE:
-            return _give_up(problem, share, outcome)
-    return None
-
-
-def _relax(problem: Problem, time: float, newton: Newton, solver: LinearSolver) -> bool:
-    """From the initial state to rest under what holds at `time`; whether it gives up."""
-    problem.initialise()
-    step, state = STATIONARY, problem.vector.copy()
-    started = False
-    while step >= SHORTEST:
-        problem.begin_step(time, step)
-        if newton.solve(problem, solver).reason is None:
-            if step == STATIONARY:
-                return False
-            started, state = True, problem.vector.copy()
-            step = min(10 * step, STATIONARY)
-        else:
+    def raise_charge(self) -> StepError | None:
+        """Continuation from the uncharged body. The fields then hold the state of rest; otherwise, why they do not."""
+        problem = self.problem
+        problem.initialise(charge_share=0.0)
+        outcome = self._at_share(0.0, problem.vector.copy())
+        if outcome.failure is not None:
+            return self._failed(0.0, outcome.failure)
+        step, reached = 1.0, [(0.0, problem.vector.copy())]
+        while reached[-1][0] < 1.0:
+            share, state = reached[-1]
+            target = min(1.0, share + step)
+            guess = state
+            if len(reached) > 1:
+                earlier, old = reached[-2]
+                guess = state + (target - share) / (share - earlier) * (state - old)
+            outcome = self._at_share(target, guess)
+            if outcome.failure is None:
+                reached = [(share, state), (target, problem.vector.copy())]
+                step *= 2
+                continue
             problem.vector[:] = state
-            step /= 20 if started else 1e3  # 20 undoes the last growth and halves
-    return True
+            step /= 4
+            if step < SMALLEST_SHARE:
+                return self._failed(share, outcome.failure)
+        return None
 
+    def relax(self) -> bool:
+        """From the initial state to rest under what holds at the time; whether it is reached."""
+        problem = self.problem
+        problem.initialise()
+        step, state = STATIONARY, problem.vector.copy()
+        started = False
+        while step >= SHORTEST:
+            problem.begin_step(self.time, step)
+            if self.newton.solve(problem, self.factorisation).failure is None:
+                if step == STATIONARY:
+                    return True
+                started, state = True, problem.vector.copy()
+                step = min(10 * step, STATIONARY)
+            else:
+                problem.vector[:] = state
+                step /= 20 if started else 1e3  # 20 undoes the last growth and halves
+        return False
 
-def _give_up(problem: Problem, share: float, outcome: Outcome) -> StepError:
-    reason, remedy = outcome.reason, outcome.remedy
-    found = singular_mode(problem) if remedy == LOST else ""
-    if found:
-        reason, remedy = f"the linear system is singular: {found}", UNDETERMINED
-    reason = f"equilibrate, at {share:.3g} of the charge: {reason}"
-    return StepError(problem.scene.start, STATIONARY, outcome.field, outcome.where, reason, remedy)
+    def _at_share(self, share: float, guess: NDArray) -> Outcome:
+        self.problem.begin_step(self.time, STATIONARY, guess, charge_share=share)
+        return self.newton.solve(self.problem, self.factorisation)
+
+    def _failed(self, share: float, failure: Failure) -> StepError:
+        found = singular_mode(self.problem) if failure.reason in UNCONVERGED else None
+        cause = None if found is None else found.failure
+        self.problem.initialise()
+        start = self.problem.setup.start
+        opening = f"equilibrate finds no state of rest, at {share:.3g} of the charge"
+        return StepError(start, STATIONARY, failure, cause, opening, end=self.problem.snapshot(start))

@@ -1,15 +1,41 @@
-"""What holds and loads the body: rollers, symmetry planes, pins, tractions, weight."""
+"""What holds the body: rollers, symmetry planes, pins."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+from ngsolve import specialcf
 
 from ngswell import checks
+from ngswell.baths.treatment import Surroundings
+from ngswell.errors import InputError
+from ngswell.mesh.points import points, vertices
+
+
+@runtime_checkable
+class Support(Protocol):
+    """Displacements that vanish. A support of one's own derives from this and gives, numbered:
+
+    1. `check_in`: its refusals;
+    2. `fixed`: boundaries on which components of the displacement vanish;
+    3. `pins`: vertices at which they do.
+    """
+
+    def check_in(self, surroundings: Surroundings) -> None: ...
+
+    def fixed(self, surroundings: Surroundings) -> dict[str, str]:
+        """Boundaries ("a|b") by direction."""
+        return {}
+
+    def pins(self, surroundings: Surroundings) -> list[tuple[int, str]]:
+        """Pairs of a vertex and a direction."""
+        return []
 
 
 @dataclass(frozen=True)
-class Roller:
+class Roller(Support):
     """The displacement in `direction` ("x", "y"; "xy" for both) vanishes on a boundary.
 
     Like every boundary it is sealed unless it has a bath."""
@@ -21,9 +47,16 @@ class Roller:
         checks.name("Roller: boundary", self.boundary, "left|right")
         checks.name("Roller: direction", self.direction, "x")
 
+    def check_in(self, surroundings: Surroundings) -> None:
+        surroundings.check_boundary("Roller", self.boundary)
+        _check_directions("Roller", self.direction, surroundings)
+
+    def fixed(self, surroundings: Surroundings) -> dict[str, str]:
+        return dict.fromkeys(self.direction, self.boundary)
+
 
 @dataclass(frozen=True)
-class Symmetry:
+class Symmetry(Support):
     """A symmetry plane: the displacement normal to a straight boundary along an axis vanishes; no flow through it."""
 
     boundary: str
@@ -31,47 +64,57 @@ class Symmetry:
     def __post_init__(self) -> None:
         checks.name("Symmetry: boundary", self.boundary, "left")
 
+    def check_in(self, surroundings: Surroundings) -> None:
+        wet = {name for bath in surroundings.baths for name in bath.boundary.split("|")}
+        names = surroundings.check_boundary("Symmetry", self.boundary)
+        self._normal(surroundings)
+        for name in names:
+            if name in wet:
+                raise InputError(f"Symmetry on {name!r}: it has a bath, but nothing flows through a symmetry plane")
+
+    def fixed(self, surroundings: Surroundings) -> dict[str, str]:
+        return {self._normal(surroundings): self.boundary}
+
+    def _normal(self, surroundings: Surroundings) -> str:
+        """The direction of the plane's normal."""
+        mesh = surroundings.mesh
+        normals = np.abs(specialcf.normal(mesh.dim)(points(mesh, mesh.Boundaries(self.boundary), 2)))
+        axis = int(np.argmax(normals[0]))
+        if normals[:, axis].min() < 1 - 1e-9:
+            raise InputError(f"Symmetry on {self.boundary!r}: the boundary is not straight along an axis")
+        return surroundings.kinematics.directions[axis]
+
 
 @dataclass(frozen=True)
-class Pin:
+class Pin(Support):
     """The displacement in `direction` vanishes at the mesh vertex at `point` [mm]."""
 
     point: tuple[float, ...]
     direction: str
 
     def __post_init__(self) -> None:
-        checks.settle(self, point=checks.vector("Pin: point", self.point, 1e6, "mm"))
+        checks.set_fields(self, point=checks.vector("Pin: point", self.point, 1e6, "mm"))
         checks.name("Pin: direction", self.direction, "x")
 
+    def check_in(self, surroundings: Surroundings) -> None:
+        _check_directions("Pin", self.direction, surroundings)
+        self._vertex(surroundings)
 
-Support: TypeAlias = Roller | Symmetry | Pin
+    def pins(self, surroundings: Surroundings) -> list[tuple[int, str]]:
+        return [(self._vertex(surroundings), direction) for direction in self.direction]
 
-
-@dataclass(frozen=True)
-class Traction:
-    """Traction on a boundary [N/mm²], per area and in the direction of the reference configuration, eq. (36)."""
-
-    boundary: str
-    vector: tuple[float, ...]
-
-    def __post_init__(self) -> None:
-        checks.name("Traction: boundary", self.boundary, "top")
-        checks.settle(self, vector=checks.vector("Traction", self.vector, 1e3, "N/mm²"))
-
-
-@dataclass(frozen=True)
-class Weight:
-    """Body force ρ b of (16) from the specific weights of solid and fluid substance [N/mm³]; water has 1e-5.
-
-    The fluid's weight also drives seepage, as in (19). `fluid` and `solid` are vectors, such as (0, -1e-5).
-    """
-
-    fluid: tuple[float, ...]
-    solid: tuple[float, ...]
-
-    def __post_init__(self) -> None:
-        for name in ("fluid", "solid"):
-            checks.settle(self, **{name: checks.vector(f"Weight: {name}", getattr(self, name), 1.0, "N/mm³")})
+    def _vertex(self, surroundings: Surroundings) -> int:
+        places = vertices(surroundings.mesh)
+        if len(self.point) != surroundings.mesh.dim:
+            raise InputError(f"Pin at {self.point} needs {surroundings.mesh.dim} coordinates [mm]")
+        distances = np.linalg.norm(places - np.array(self.point), axis=1)
+        nearest = int(np.argmin(distances))
+        if distances[nearest] > 1e-9 * max(1.0, float(np.abs(places).max())):
+            raise InputError(f"Pin at {self.point}: no mesh vertex there; the nearest is {tuple(places[nearest])}")
+        return nearest
 
 
-Load: TypeAlias = Traction | Weight
+def _check_directions(what: str, directions: str, surroundings: Surroundings) -> None:
+    known = surroundings.kinematics.directions
+    if any(direction not in known for direction in directions):
+        raise InputError(f"{what}: direction {directions!r} is none of {', '.join(known)} (or several of them)")

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from functools import cache
-from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from netgen.meshing import NgException
 from ngsolve import H1, BaseMatrix, BaseVector, BilinearForm, BitArray, dx
 from ngsolve.meshes import Make1DMesh
-from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from ngswell.problem.problem import Problem
+from ngswell.problem.problem import Problem
 
 
 @cache
@@ -27,16 +24,16 @@ def best_solver() -> str:
     return "pardiso"
 
 
-class Point(NamedTuple):
-    """Where a matrix is dr/dx: time and step [s], and fields."""
-
-    time: float
-    dt: float
-    values: NDArray
-
-
 class LinearSolver:
-    """Solves A x = b on the free degrees of freedom, for matrices of one pattern whose values change."""
+    """Solves A x = b on the free degrees of freedom, for matrices of one pattern whose values change.
+
+    A linear solver of one's own derives from this; `scene.run(..., solver=MySolver)` calls it with the problem. It gives:
+
+    1. `factorise`: prepare solves with a matrix; False where it is singular or not finite;
+    2. `invert`: the solution on the free degrees of freedom; False where none is found;
+    3. `linearise`, if it takes another matrix than `problem.linearise()`;
+    4. `direct`, `name`: whether problems are of a size that is factorised as a whole, and what to call it.
+    """
 
     direct = True
     """Whether the problem is of a size that is factorised as a whole."""
@@ -47,18 +44,9 @@ class LinearSolver:
         self._matrix: BaseMatrix | None = None
         self._inverse: BaseMatrix | None = None
         self.factorisations = self.solves = 0
-        self.ready = False
-        """Whether there is a factorisation that may be used again."""
-        self.contraction: float | None = None
-        """The last correction made with the present factorisation over the one before, once there are two."""
-        self.factorised: Point | None = None
-        """Of the present factorisation."""
-        self._analysed: Point | None = None
-        """Of the first one: the analysis, which all share, depends on its values."""
 
     def factorise(self, matrix: BaseMatrix) -> bool:
         """Factorise `matrix`; False if it is singular or holds a value that is not finite."""
-        self.ready, self.contraction = False, None
         if not np.isfinite(matrix.AsVector().FV().NumPy()).all():
             return False
         try:
@@ -70,7 +58,6 @@ class LinearSolver:
             self._inverse = None
             return False
         self.factorisations += 1
-        self.ready = True
         return True
 
     def linearise(self, problem: Problem) -> BaseMatrix:
@@ -79,54 +66,25 @@ class LinearSolver:
 
     def renew(self, problem: Problem) -> bool:
         """Linearise and factorise; False as `factorise`, or where a cell's own unknowns cannot be eliminated."""
-        at, first = Point(problem.time, problem.dt.Get(), problem.vector.copy()), self._inverse is None
         try:
             matrix = self.linearise(problem)
         except NgException:
-            self.ready = False
             return False
-        if not self.factorise(matrix):
-            return False
-        self.factorised = at
-        self._analysed = at if first else self._analysed
-        return True
-
-    def memory(self) -> dict[str, NDArray]:
-        """What makes the next solve, or the next factorisation, the same in another process."""
-        kept = {"counts": np.array([self.factorisations, self.solves]), "ready": np.array(self.ready)}
-        if self.contraction is not None:
-            kept["contraction"] = np.array(self.contraction)
-        for name, point in (("analysed", self._analysed), ("factorised", self.factorised)):
-            if point is not None:
-                kept |= {f"{name} at": np.array([point.time, point.dt]), f"{name} fields": point.values}
-        return kept
-
-    def remember(self, problem: Problem, memory: dict[str, NDArray]) -> None:
-        """Factorise as before; moves the fields and the clock of `problem`."""
-        for name in ("analysed", "factorised"):
-            if f"{name} at" in memory:
-                time, dt = memory[f"{name} at"].tolist()
-                problem.set_time(time)
-                problem.dt.Set(dt)
-                problem.vector[:] = memory[f"{name} fields"]
-                self.renew(problem)
-        self.factorisations, self.solves = memory["counts"].tolist()
-        self.ready = bool(memory["ready"])
-        self.contraction = float(memory["contraction"]) if "contraction" in memory else None
+        return self.factorise(matrix)
 
     def solve(self, right: BaseVector, solution: BaseVector, prescribed: BaseVector | None = None) -> bool:
         """solution = A⁻¹ right, with `prescribed` values where degrees of freedom are not free; False if not finite."""
         if prescribed is None:
-            solved = self._invert(right, solution)
+            solved = self.invert(right, solution)
         else:
             moved = right.CreateVector()
             moved.data = right - self._matrix * prescribed
-            solved = self._invert(moved, solution)
+            solved = self.invert(moved, solution)
             solution.data += prescribed
         self.solves += 1
         return solved and bool(np.isfinite(solution.FV().NumPy()).all())
 
-    def _invert(self, right: BaseVector, solution: BaseVector) -> bool:
+    def invert(self, right: BaseVector, solution: BaseVector) -> bool:
         """A⁻¹ on the free degrees of freedom, zero elsewhere; not in place."""
         if self._inverse is None:
             raise RuntimeError("factorise before solving")

@@ -9,8 +9,10 @@ import numpy as np
 from ngsolve import BaseVector
 
 from ngswell import checks
+from ngswell.errors import Failure, Reason
+from ngswell.problem.admissible import Violation
 from ngswell.problem.problem import Problem
-from ngswell.solve.direct import LinearSolver
+from ngswell.solve.factorisation import Factorisation
 
 SHORTEST = 1e-12
 """Share of a correction below which keeping the fields admissible leaves none of it."""
@@ -18,28 +20,14 @@ SHORTEST = 1e-12
 
 @dataclass(frozen=True)
 class Outcome:
-    """How a nonlinear solve ended: `reason` is None on success, else what went wrong, in which field, where; what helps."""
+    """How a nonlinear solve ended; `failure` is None on success."""
 
     iterations: int
-    reason: str | None = None
-    field: str = ""
-    where: tuple[float, ...] = ()
-    remedy: str = ""
-
-
-SQUEEZED = "Remedies: a smaller or slower load or change of the bath, a finer mesh there."
-UNRESOLVED = (
-    "Remedies: Penalty or Multiplier in place of Nitsche; where anions are few, a slower change of bath or charge, finer "
-    "cells at the bath; Potential(), whose ions cannot be negative."
-)
-LOST = (
-    "Remedies: a gentler ramp, a finer mesh where the field is worst, a weaker penalty; the surface of a gel that is held "
-    "sideways and swells beyond J = 2.5 may wrinkle."
-)
+    failure: Failure | None = None
 
 
 @dataclass(frozen=True)
-class Newton:
+class DampedNewton:
     """Damped Newton iteration, with new or old matrices.
 
     A field has converged when the last correction's largest coefficient is below `tolerance` times the field's reference
@@ -61,100 +49,122 @@ class Newton:
     slowest: float = 0.0
 
     def __post_init__(self) -> None:
-        checks.settle(
+        checks.set_fields(
             self,
-            tolerance=checks.number("Newton: tolerance", self.tolerance, low=1e-16, high=1.0),
-            most_iterations=checks.whole("Newton: most_iterations", self.most_iterations, 1, 1000),
-            least_damping=checks.number("Newton: least_damping", self.least_damping, low=1e-10, high=1.0),
-            slowest=checks.number("Newton: slowest", self.slowest, low=0.0, high=0.99, hint="0 renews every matrix"),
+            tolerance=checks.number("DampedNewton: tolerance", self.tolerance, low=1e-16, high=1.0),
+            most_iterations=checks.integer("DampedNewton: most_iterations", self.most_iterations, 1, 1000),
+            least_damping=checks.number("DampedNewton: least_damping", self.least_damping, low=1e-10, high=1.0),
+            slowest=checks.number("DampedNewton: slowest", self.slowest, low=0.0, high=0.99, hint="0 renews every matrix"),
         )
 
-    def solve(self, problem: Problem, solver: LinearSolver) -> Outcome:
+    def solve(self, problem: Problem, factorisation: Factorisation) -> Outcome:
         """Iterate from the fields of `problem`, in place."""
-        vector = problem.vector
-        residual, correction, simplified, gap = (problem.fields.vec.CreateVector() for _ in range(4))
+        return _Iteration(self, problem, factorisation).run()
 
-        def solve(solution: BaseVector) -> bool:
-            excess = problem.gap()
-            if not excess.any():
-                return solver.solve(residual, solution)
-            gap.FV().NumPy()[:] = excess
-            return solver.solve(residual, solution, gap)
 
-        def size(change: BaseVector) -> float:
-            values = change.FV().NumPy()
-            return max(float(np.abs(values[problem.ranges[n]]).max()) / problem.references[n] for n in problem.names)
+class _Iteration:
+    """One nonlinear solve: the fields on their way from the first iterate to the solution."""
 
-        def failure(count: int, reason: str) -> Outcome:
-            field, where = problem.worst(correction.FV().NumPy())
-            return Outcome(count, reason, field, where, LOST)
+    def __init__(self, method: DampedNewton, problem: Problem, factorisation: Factorisation) -> None:
+        self.method, self.problem, self.factorisation = method, problem, factorisation
+        vectors = (problem.fields.vec.CreateVector() for _ in range(4))
+        self.residual, self.correction, self.simplified, self._gap = vectors
+        self.correction[:] = 0.0
+        self.count = 0
+        self.beyond: Violation | None = None  # what the last correction would leave the physical range with
 
-        def left(change: float) -> float:
-            """What further corrections with the present factorisation would add up to, after one of this size."""
-            rate = solver.contraction
-            return change if rate is None or not self.slowest else change * min(1.0, rate / (1 - rate))
-
-        def success(count: int) -> Outcome:
-            found = problem.inadmissible_solution()
-            if found is None:
-                return Outcome(count)
-            return Outcome(count, f"{found[0]} is not positive in the solution", found[0], found[1], UNRESOLVED)
-
-        correction[:] = 0.0
-        found = problem.inadmissible()
-        if found:
-            return Outcome(0, f"the step starts with {found[0]} not positive", found[0], found[1], SQUEEZED)
-        problem.residual(residual)
-        renew = not self._may_keep(solver)
-        beyond: tuple[str, tuple[float, ...]] | None = None  # what the last correction would leave the physical range with
+    def run(self) -> Outcome:
+        """Corrections until the fields have converged or an attempt fails."""
+        violation = self.problem.admissible.violation()
+        if violation:
+            return self._violated(Reason.NOT_ADMISSIBLE_AT_START, violation)
+        self.problem.residual(self.residual)
         known = False  # whether `correction` answers the present residual
-        for count in range(1, self.most_iterations + 1):
-            if renew and not solver.renew(problem):
-                return failure(count, "the linear system is singular or not finite")
-            if (renew or not known) and not solve(correction):
-                return failure(count, "the linear system is singular or not finite")
-            before = size(correction)
-            start = vector.copy()
-            damping, rate, least = 1.0, inf, SHORTEST
-            while True:
-                vector[:] = start - damping * correction.FV().NumPy()
-                refused = problem.inadmissible()
-                beyond = refused or (beyond if damping < 1.0 else None)
-                if refused is None:
-                    least = max(least, self.least_damping * damping)
-                    if damping == 1.0 and (before if renew else left(before)) <= self.tolerance:
-                        return success(count)
-                    problem.residual(residual)
-                    if solve(simplified):
-                        rate = size(simplified) / before
-                        if rate <= 1 - damping / 4:
-                            break
-                if not renew:
-                    break
-                damping /= 2
-                if damping < least:
-                    vector[:] = start
-                    if beyond:
-                        return Outcome(count, f"{beyond[0]} would not stay positive", beyond[0], beyond[1], SQUEEZED)
-                    return failure(count, "Newton's method stalls: no damped step reduces the correction")
-            if not renew and (refused or not rate < 1):
-                vector[:] = start
-                problem.residual(residual)
-                renew = True
+        fresh = not self.factorisation.usable
+        while self.count < self.method.most_iterations:
+            self.count += 1
+            if (fresh and not self.factorisation.renew(self.problem)) or not (known or self._solve(self.correction)):
+                return self._failed(Reason.SINGULAR)
+            ended, accepted, damping = self._damp(fresh)
+            if ended is not None:
+                return ended
+            if not accepted:  # the matrix was an old one
+                fresh, known = True, False
                 continue
-            solver.contraction = max(rate, solver.contraction or 0.0)
-            if damping == 1.0 and left(size(simplified)) <= self.tolerance:
-                converged = vector.copy()
-                vector -= simplified.FV().NumPy()
-                if problem.inadmissible():  # at the edge of the physical range even what is left may be too much
-                    vector[:] = converged
-                return success(count)
-            known = damping == 1.0 and self._may_keep(solver)
-            renew = not known
-            correction.data = simplified
-        if beyond:
-            return Outcome(count, f"{beyond[0]} would not stay positive", beyond[0], beyond[1], SQUEEZED)
-        return failure(self.most_iterations, f"Newton's method needs more than {self.most_iterations} iterations")
+            if damping == 1.0 and self.factorisation.left(self._size(self.simplified)) <= self.method.tolerance:
+                return self._finish()
+            known = damping == 1.0 and self.factorisation.usable
+            fresh = not known
+            self.correction.data = self.simplified
+        if self.beyond:
+            return self._violated(Reason.NOT_ADMISSIBLE, self.beyond)
+        return self._failed(Reason.TOO_MANY_ITERATIONS, str(self.method.most_iterations))
 
-    def _may_keep(self, solver: LinearSolver) -> bool:
-        return solver.ready and (solver.contraction is None or solver.contraction <= self.slowest) and self.slowest > 0
+    def _damp(self, fresh: bool) -> tuple[Outcome | None, bool, float]:
+        """Take as much of the correction as helps: the end of the solve if it is one, whether a step was accepted, its part.
+
+        With a `fresh` matrix the step is halved until the fields are admissible and the simplified correction is smaller;
+        with an old one a step that does not help at once is taken back.
+        """
+        problem, vector, method = self.problem, self.problem.vector, self.method
+        before, start = self._size(self.correction), vector.copy()
+        damping, rate, least = 1.0, inf, SHORTEST
+        while True:
+            vector[:] = start - damping * self.correction.FV().NumPy()
+            refused = problem.admissible.violation()
+            self.beyond = refused or (self.beyond if damping < 1.0 else None)
+            if refused is None:
+                least = max(least, method.least_damping * damping)
+                if damping == 1.0 and (before if fresh else self.factorisation.left(before)) <= method.tolerance:
+                    return self._success(), True, damping
+                problem.residual(self.residual)
+                if self._solve(self.simplified):
+                    rate = self._size(self.simplified) / before
+                    if rate <= 1 - damping / 4:
+                        break
+            if not fresh:
+                break
+            damping /= 2
+            if damping < least:
+                vector[:] = start
+                if self.beyond:
+                    return self._violated(Reason.NOT_ADMISSIBLE, self.beyond), False, damping
+                return self._failed(Reason.STALLED), False, damping
+        if not fresh and (refused or not rate < 1):
+            vector[:] = start
+            problem.residual(self.residual)
+            return None, False, damping
+        self.factorisation.contracted(rate)
+        return None, True, damping
+
+    def _finish(self) -> Outcome:
+        """Apply the simplified correction that passed the test as well."""
+        vector = self.problem.vector
+        converged = vector.copy()
+        vector -= self.simplified.FV().NumPy()
+        if self.problem.admissible.violation():  # at the edge of the physical range even what is left may be too much
+            vector[:] = converged
+        return self._success()
+
+    def _solve(self, solution: BaseVector) -> bool:
+        """The correction that answers the present residual, prescribed values included."""
+        excess = self.problem.gap()
+        if not excess.any():
+            return self.factorisation.solve(self.residual, solution)
+        self._gap.FV().NumPy()[:] = excess
+        return self.factorisation.solve(self.residual, solution, self._gap)
+
+    def _size(self, change: BaseVector) -> float:
+        """The largest coefficient of any field, in units of its reference."""
+        problem, values = self.problem, change.FV().NumPy()
+        return max(float(np.abs(values[problem.ranges[n]]).max()) / problem.references[n] for n in problem.names)
+
+    def _success(self) -> Outcome:
+        violation = self.problem.admissible.violation(solution=True)
+        return Outcome(self.count) if violation is None else self._violated(Reason.NOT_A_SOLUTION, violation)
+
+    def _violated(self, reason: Reason, violation: Violation) -> Outcome:
+        return Outcome(self.count, Failure(reason, violation.what, violation.where, violation.what))
+
+    def _failed(self, reason: Reason, what: str = "") -> Outcome:
+        return Outcome(self.count, Failure(reason, *self.problem.worst(self.correction.FV().NumPy()), what))

@@ -14,16 +14,16 @@ from ngswell.problem.problem import Problem
 from ngswell.solve.direct import LinearSolver
 
 TOLERANCE = 1e-8
-"""GMRES stops when the preconditioned residual, an estimate of the error, has fallen by this factor."""
+"""GMRES stops when the preconditioned residual has fallen by this factor. That residual estimates the error."""
 
 ROUND_OFF = 1e-13
-"""In units of the fields; a right-hand side that asks for less is none, as at a state of rest."""
+"""GMRES also stops below this residual, in units of the fields. At a state of rest the right-hand side is round-off only."""
 
 MOST_ITERATIONS = 40
-"""What needs more gets the larger coarse level; what needs three times as many even so has failed."""
+"""Iterations of GMRES. A matrix that needs more gets the larger coarse level. There three times as many are allowed."""
 
 EASY = 10
-"""With so few iterations on the larger coarse level the next matrix gets the smaller one, which then needs some 20."""
+"""Iterations on the larger coarse level. After a solve with so few, the next matrix gets the smaller level."""
 
 
 class TwoLevelSolver(LinearSolver):
@@ -48,7 +48,7 @@ class TwoLevelSolver(LinearSolver):
         super().__init__(problem.free)
         self.iterations = 0  # of the last solve
         self._patches, self._levels = _patches(problem), _coarse_levels(problem)
-        self._units = units(problem)
+        self._units = problem.sizes
         self._level = 0
         self._smoother: BaseMatrix | None = None
         self._coarse: LinearSolver | None = None
@@ -60,7 +60,6 @@ class TwoLevelSolver(LinearSolver):
 
     def factorise(self, matrix: BaseMatrix) -> bool:
         """Prepare the preconditioner of `matrix`; False if a part of it is singular or a value is not finite."""
-        self.ready, self.contraction = False, None
         if self._level and self.iterations <= EASY:
             self._level, self._coarse = 0, None
         self._matrix, self._smoother = matrix, None
@@ -73,10 +72,9 @@ class TwoLevelSolver(LinearSolver):
         except NgException:
             return False
         self.factorisations += 1
-        self.ready = True
         return True
 
-    def _invert(self, right: BaseVector, solution: BaseVector) -> bool:
+    def invert(self, right: BaseVector, solution: BaseVector) -> bool:
         """A⁻¹ on the free degrees of freedom; False if GMRES does not converge."""
         if self._matrix is None or self._smoother is None:
             raise RuntimeError("factorise before solving")
@@ -110,14 +108,6 @@ def gmres(
     if not converged or not np.isfinite(solution.FV().NumPy()).all():
         return None
     return method.iterations - 1  # it counts the start
-
-
-def units(problem: Problem) -> NDArray:
-    """The reference size of every coefficient of a problem's fields."""
-    sizes = np.empty(problem.space.ndof)
-    for name, reference in problem.references.items():
-        sizes[problem.ranges[name]] = reference
-    return sizes
 
 
 class _Cycle(BaseMatrix):

@@ -26,6 +26,7 @@ from ngswell import (
     Bath,
     Concentration,
     Confined,
+    DampedNewton,
     Essential,
     Fixed,
     Frozen,
@@ -39,7 +40,6 @@ from ngswell import (
     MackieMeares,
     Material,
     Multiplier,
-    Newton,
     Nitsche,
     Penalty,
     PlaneStrain,
@@ -54,10 +54,12 @@ from ngswell import (
     column,
     rectangle,
 )
+from ngswell.errors import Reason
 from ngswell.observers.base import Observer
-from ngswell.physics.material import Constant
+from ngswell.physics.pores import Constant
+from ngswell.problem.forms import cell_size
+from ngswell.problem.problem import Problem
 from ngswell.stepping.schemes import Scheme
-from studies.hard import unusable
 from tests.fuzz.fuzzing import FRESH, SCALE
 
 MOST_STEPS = 8
@@ -80,7 +82,7 @@ class Watch(Observer):
     """Keeps the last accepted state, looks at each, and ends the run after a few."""
 
     def start(self, problem, begin, until):
-        self.count = -1
+        self.count, self.problem = -1, problem
         super().start(problem, begin, until)
 
     def record(self, problem, time):
@@ -89,7 +91,8 @@ class Watch(Observer):
         assert np.isfinite(self.state).all(), "an accepted state is not finite"
         assert problem.time == time, "the clock is not at the accepted state"
         if self.count:  # at the start, prescribed values may still be off
-            assert problem.inadmissible() is None, f"an accepted state is not admissible: {problem.inadmissible()}"
+            found = problem.admissible.violation()
+            assert found is None, f"an accepted state is not admissible: {found}"
         if self.count >= MOST_STEPS:
             raise Enough
 
@@ -236,49 +239,54 @@ def run(trial: Trial) -> str:
         warnings.simplefilter("error", RuntimeWarning)
         try:
             scene = Scene(**trial.scene)
-            scene.run(trial.until, trial.steps, [ledger, watch], newton=Newton() if trial.exact else None)
+            newton = DampedNewton() if trial.exact else None
+            end = scene.run(trial.until, trial.steps, [ledger, watch], newton=newton).end
             outcome = "finished"
         except InputError:
             return "refused"
         except Enough:
-            outcome = "enough"
+            end, outcome = watch.problem.snapshot(watch.problem.time), "enough"
         except StepError as stopped:
-            check_stop(scene, stopped, watch)
-            outcome = "stopped"
-    problem = scene.problem
-    assert not (found := unusable(scene, watch.at)) or watch.count == 0, found
+            check_stop(watch.problem, stopped, watch)
+            end, outcome = stopped.end, "stopped"
+    problem = watch.problem  # the run's own
+    assert problem.time == end.time == watch.at
+    assert np.isfinite(problem.vector).all()
     assert np.array_equal(problem.vector, watch.state)
+    assert np.array_equal(end.values, watch.state)
+    assert (found := problem.admissible.violation()) is None or watch.count == 0, found
     for name, field in problem.state.outputs().items():
-        assert np.isfinite(field(problem._quadrature)).all(), f"{name} is not finite"
-    check_ions(scene)
+        assert np.isfinite(field(problem.points)).all(), f"{name} is not finite"
+    for name, field in scene.state(end).outputs().items():
+        assert np.array_equal(field(problem.points), problem.state.outputs()[name](problem.points), equal_nan=True), name
+    check_ions(problem)
     if trial.exact:
-        check_ledger(scene, ledger, trial.steps.scheme)
+        check_ledger(problem, ledger, trial.steps.scheme)
     return outcome
 
 
-def check_stop(scene: Scene, stopped: StepError, watch: Watch) -> None:
+def check_stop(problem: Problem, stopped: StepError, watch: Watch) -> None:
     assert stopped.time == watch.at, "the error's time is not that of the last accepted state"
     assert 0 < stopped.step < np.inf
-    assert stopped.reason
-    assert len(stopped.where) == scene.mesh.dim
+    assert isinstance(stopped.reason, Reason)
+    assert len(stopped.where) == problem.mesh.dim
     assert np.isfinite(stopped.where).all()
-    assert stopped.field in (*scene.problem.names, *scene.problem._bounds, *scene.problem._solution_bounds)
+    assert stopped.field in (*problem.names, *problem.admissible.always, *problem.admissible.in_solutions)
     assert "nan" not in str(stopped)
 
 
 WORST: Counter[str] = Counter()
 
 
-def check_ledger(scene: Scene, ledger: Ledger, scheme: Scheme) -> None:
+def check_ledger(problem: Problem, ledger: Ledger, scheme: Scheme) -> None:
     """What the nonlinear solves leave, in units of the body's volume and, for ions, of the largest concentration.
 
     Beside their tolerance it is the flow that round-off of pressure and concentration drives through a cell in the time of
     the run: Holmes and Mow's permeability of a body that swells ten times is beyond 1e40 of the initial one. And a step of
     ESDIRK4 takes over the rates that the contents of the step before tell, whose round-off grows with the ratio of both.
     """
-    problem, m = scene.problem, scene.material
-    where = problem._quadrature
-    volume, h = float(Integrate(CF(1.0), scene.mesh)), problem.cell_size("top")
+    where, m = problem.points, problem.setup.material
+    volume, h = float(Integrate(CF(1.0), problem.mesh)), cell_size(problem.mesh, "top")
     sizes = {"fluid": volume, "cations": volume * problem.references.get("salt", problem.references.get("c", 1.0))}
     pressure = m.mu + float(np.abs(problem.state.outputs()["p"](where)).max())
     mobility = float(np.max(CF(problem.state.permeability)(where))) * pressure + max(m.D_plus, m.D_minus)
@@ -294,18 +302,17 @@ def check_ledger(scene: Scene, ledger: Ledger, scheme: Scheme) -> None:
         assert found <= LEDGER_BOUND + driven, f"the ledger of {name} is open by {open_by:.3g}"
 
 
-def check_ions(scene: Scene) -> None:
+def check_ions(problem: Problem) -> None:
     """Anions are positive by themselves where they follow from c̃ or the bath. As a difference, in `Concentration`, they
 
     undershoot on cells as coarse as these; c₊ c₋ + cfc(J)²/4 > 0 is what its pressure needs and Newton's method keeps.
     """
-    problem = scene.problem
     state, outputs = problem.state, problem.state.outputs()
     if "c_minus" not in outputs:
         return
-    where = problem._quadrature
+    where = problem.points
     plus, minus, charge = (np.asarray(f(where)) for f in (outputs["c_plus"], outputs["c_minus"], state.pointwise_charge))
-    if isinstance(scene.model, Concentration):
+    if isinstance(problem.model, Concentration):
         WORST["anions below zero"] = max(WORST["anions below zero"], -float(minus.min()) / problem.references["c"])
         assert (plus * minus + charge**2 / 4 > 0).all()
     else:

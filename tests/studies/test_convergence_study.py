@@ -5,9 +5,10 @@ import pytest
 
 from ngswell import TABLE_2
 from ngswell.closed_forms.homogeneous import homogeneous_equilibrium
-from studies.convergence import VARIANTS, as_variant, growth_rates, held_sideways, swell, undrained
-from studies.free_swelling import scene
-from tests.studies.test_studies import quick
+from studies.limits.convergence.spectra import growth_rates, held_sideways, swell, undrained
+from studies.limits.convergence.variants import VARIANTS, as_variant
+from studies.scenes import free_swelling_block
+from tests.studies.quick import quick
 
 
 @pytest.fixture(scope="module")
@@ -69,14 +70,14 @@ def test_a_negative_eigenvalue_alone_does_not_grow():
 @pytest.mark.parametrize("time", [7000.0, 11000.0])
 def test_a_freely_swollen_gel_has_no_such_modes(time):
     # Swollen alike in all directions (J = 1.41 and 3.05) nothing is compressed along the surface: J alone is not the cause.
-    block = as_variant(scene(8, 8), "smooth")
+    block = as_variant(free_swelling_block(8, 8), "smooth")
     block.equilibrate(time)
     assert undrained(block.problem).values[0] > 0
 
 
 def test_every_variant_starts_from_the_same_rest():
     # At rest cfc is uniform and the variants differ by nothing: Newton's tolerance.
-    states = [as_variant(scene(4, 4), name).equilibrate(7000.0).values for name in VARIANTS]
+    states = [as_variant(free_swelling_block(4, 4), name).equilibrate(7000.0).values for name in VARIANTS]
     for other in states[1:]:
         assert other == pytest.approx(states[0], abs=1e-7)
 

@@ -2,8 +2,8 @@
 
 import pytest
 
-from studies.growth import QUICK_CELLS, STEPS, TIMES
-from tests.studies.test_studies import quick
+from studies.choices.growth import QUICK_CELLS, STEPS, TIMES
+from tests.studies.quick import quick
 
 
 def unknowns(dimension, cells):

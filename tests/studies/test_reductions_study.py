@@ -3,8 +3,8 @@
 import pytest
 
 from ngswell import TABLE_1
-from studies.reductions import BATHS, CHARGED, CHARGES, LOADS, MODELS, RATIOS, H
-from tests.studies.test_studies import quick
+from studies.choices.reductions import BATHS, CHARGED, CHARGES, LOADS, MODELS, RATIOS, H
+from tests.studies.quick import quick
 
 
 def test_reductions(tmp_path):

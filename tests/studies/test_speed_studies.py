@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from studies import speed_error
 from studies.__main__ import main
-from studies.speed_error import Course, Reference, seconds_at
-from tests.studies.test_studies import quick
+from studies.choices import speed_error
+from studies.choices.speed_error import ComputedBlock, Reference, seconds_at
+from tests.studies.quick import quick
 
 
 def test_seconds_at_an_error():
@@ -26,9 +26,9 @@ def test_reference_is_cubic_between_kinks():
 
     own = np.concatenate([np.linspace(7000, 7080, 9), np.linspace(7080, 7220, 11)[1:]])
     wanted = np.array([7003.0, 7079.0, 7080.0, 7081.0, 7219.0])
-    reference = Reference(Course(own, history(own), None, 0, []))
+    reference = Reference(ComputedBlock(own, history(own), None, 0, []))
     assert reference.area(wanted) == pytest.approx(history(wanted), rel=1e-12)
-    across = Reference(Course(own, history(own), None, 0, []), kinks=(7000.0, 7220.0))
+    across = Reference(ComputedBlock(own, history(own), None, 0, []), kinks=(7000.0, 7220.0))
     assert np.abs(across.area(wanted) - history(wanted)).max() > 1e-3
 
 

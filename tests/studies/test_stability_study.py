@@ -7,8 +7,8 @@ import pytest
 from ngswell import TABLE_1
 from ngswell.closed_forms.homogeneous import lagged_column_factor
 from ngswell.physics import donnan
-from studies.stability import BATH, CHARGES, RANGE, SOFT, TREATMENTS, column_safe_stiffness, material
-from tests.studies.test_studies import quick
+from studies.choices.stability import BATH, CHARGES, RANGE, SOFT, TREATMENTS, column_safe_stiffness, material
+from tests.studies.quick import quick
 
 # Three points on the µ axis, two bisections: a bound is the middle of an interval of this ratio to either side.
 RESOLUTION = (RANGE[1] / RANGE[0]) ** (1 / 2 / 8)

@@ -1,33 +1,11 @@
 """Each study at its quick size, through the command line; its numbers with reasons."""
 
-import csv
-import json
-
+import matplotlib.pyplot as plt
 import pytest
 
 from studies.__main__ import STUDIES, main
-
-META = {
-    "mesh",
-    "steps",
-    "rejected_steps",
-    "newton_iterations",
-    "seconds",
-    "version_ngswell",
-    "version_ngsolve",
-    "linear_solver",
-}
-
-
-def quick(name, folder):
-    assert main([name, "--quick", "--out", str(folder)]) == 0
-    assert (folder / f"{name}.png").stat().st_size > 10_000
-    with open(folder / f"{name}.csv", encoding="utf-8") as file:
-        rows = list(csv.reader(file))
-    assert len({len(row) for row in rows[:5]}) == 1
-    numbers = json.loads((folder / f"{name}.json").read_text(encoding="utf-8"))
-    assert numbers.keys() >= META
-    return numbers, rows
+from studies.output import letter_panels
+from tests.studies.quick import quick
 
 
 def test_boundary_charge(tmp_path):
@@ -54,6 +32,11 @@ def test_oscillation(tmp_path):
     assert numbers["lagged_max_mm"] > 1e-5
     assert numbers["weak_max_mm"] < 1e-12
     assert numbers["column_factor"] == pytest.approx(-0.733, abs=5e-4)
+    # The factor is a property of the mesh: finer cells along or across, faster growth.
+    assert numbers["lagged_growth_predicted_1x30"] == pytest.approx(numbers["lagged_growth_predicted"], rel=1e-5)
+    for finer in (("1x15", "1x30", "1x60"), ("1x30", "2x30", "4x30")):
+        factors = [numbers[f"lagged_growth_predicted_{mesh}"] for mesh in finer]
+        assert factors == sorted(factors, reverse=True)
     assert {row[0] for row in rows[1:]} == {"lagged", "weak"}
 
 
@@ -134,6 +117,25 @@ def test_output_is_refused_before_computing(tmp_path, capsys):
     (tmp_path / "file").write_text("")
     assert main(["oscillation", "--out", str(tmp_path / "file" / "deeper")]) == 1
     assert "cannot be made" in capsys.readouterr().err
+
+
+def test_an_option_of_another_study_is_refused(capsys, tmp_path):
+    script = tmp_path / "plain.py"
+    script.write_text("")
+    for arguments, owner in ((["--from-rest"], "free_swelling"), (["--plain", str(script)], "speed_error")):
+        for name in ([], ["oscillation"]):
+            with pytest.raises(SystemExit):
+                main([*name, *arguments])
+            assert f"{arguments[0]} goes with {owner}" in capsys.readouterr().err
+
+
+def test_every_panel_has_a_letter():
+    _, axes = plt.subplots(1, 2)
+    axes[0].set_title("area")
+    letter_panels(axes)
+    assert [ax.get_title("left") for ax in axes] == ["(a) area", "(b)"]
+    assert not any(ax.get_title() for ax in axes)
+    plt.close("all")
 
 
 def test_an_unknown_study_lists_the_known_ones(capsys):

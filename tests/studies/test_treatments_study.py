@@ -2,8 +2,8 @@
 
 import pytest
 
-from studies.treatments import CHOICES, QUICK_DECADES, key
-from tests.studies.test_studies import quick
+from studies.choices.treatments import CHOICES, QUICK_DECADES, key
+from tests.studies.quick import quick
 
 
 def test_treatments(tmp_path):

@@ -5,12 +5,7 @@ import math
 import pytest
 from ngsolve import x
 
-from ngswell import (
-    Blend,
-    InputError,
-    Ramp,
-    rectangle,
-)
+from ngswell import Blend, InputError, Ramp, rectangle
 
 
 def test_ramp_is_linear_between_its_points_and_constant_beyond():

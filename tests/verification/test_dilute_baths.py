@@ -11,10 +11,10 @@ from ngswell import (
     Adaptive,
     Area,
     Concentration,
+    DampedNewton,
     Essential,
     Ledger,
     Multiplier,
-    Newton,
     Nitsche,
     Penalty,
     Potential,
@@ -24,8 +24,9 @@ from ngswell import (
 )
 from ngswell.closed_forms.homogeneous import homogeneous_equilibrium
 from ngswell.models import concentration
-from ngswell.problem.problem import Snapshot
-from tests.scenes import P0, confined_column, quarter
+from ngswell.problem.discretisation import Snapshot
+from studies.hard_cases.bodies import block_scene
+from tests.scenes import P0, confined_column
 
 CHOICES = {
     "Concentration": (Concentration(), None),
@@ -45,7 +46,7 @@ def test_column(choice, end, until_diluted):
     c = Ramp((0, 0.15), (until_diluted, end)) if until_diluted else end
     scene = confined_column(treatment, c=c, model=model, cells=10, initial=(0.15, 0.0))
     probe, ledger = Probe((0.1,), "J", "p", "c_plus", "cfc"), Ledger()
-    result = scene.run(1e6, Adaptive(1e-2), [probe, ledger], newton=Newton())
+    result = scene.run(1e6, Adaptive(1e-2), [probe, ledger], newton=DampedNewton())
     rest = homogeneous_equilibrium(TABLE_1, end, "confined", load=P0)
     # A homogeneous state lies in every space. What is left of the penalty at the last steps of 1e5 s is round-off, 1e-10.
     for name, value in (("J", rest.J), ("p", rest.p), ("c_plus", rest.c), ("cfc", rest.cfc)):
@@ -54,17 +55,12 @@ def test_column(choice, end, until_diluted):
     assert len(result.steps) < 150  # 60 to 80
 
 
-def block(model, treatment, c):
-    """A quarter of a square of Table 2, which starts swollen in 1 mol/l."""
-    return quarter(treatment, c, model=model, initial=(1.0, 0.0))
-
-
 def diluted_area(choice, end, duration, until):
     """Areas over time, of the block at rest in 1 mol/l whose bath goes to `end` within `duration` [s]."""
     model, treatment = CHOICES[choice]
-    swollen = Snapshot(0.0, block(model, treatment, 1.0).equilibrate().values)
-    scene, area = block(model, treatment, Ramp((0, 1.0), (duration, end)) if duration else end), Area()
-    scene.run(until, Adaptive(1e-4), [area], resume=swollen, newton=Newton())
+    swollen = Snapshot(0.0, block_scene(model, treatment, 1.0, 4).equilibrate().values)
+    scene, area = block_scene(model, treatment, Ramp((0, 1.0), (duration, end)) if duration else end, 4), Area()
+    scene.run(until, Adaptive(1e-4), [area], resume=swollen, newton=DampedNewton())
     return area.values
 
 

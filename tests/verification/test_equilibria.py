@@ -11,11 +11,11 @@ from ngswell import (
     Bath,
     Concentration,
     Confined,
+    DampedNewton,
     Fixed,
     Frozen,
     Lagged,
     Ledger,
-    Newton,
     Penalty,
     Pin,
     PlaneStrain,
@@ -72,7 +72,7 @@ def test_free_block_comes_to_the_closed_form(treatment, order):
         charge=Ramp((0, 0.0), (100, 1.0)),
     )
     area, probe = Area(), Probe((0.5, 0.4), "J", "p", "cfc", "c_plus", "nS")
-    scene.run(1e6, Adaptive(1e-2), [area, probe], newton=Newton())
+    scene.run(1e6, Adaptive(1e-2), [area, probe], newton=DampedNewton())
     state = homogeneous_equilibrium(TABLE_2, 0.3, "plane strain")
     # A homogeneous state lies in every space: what is left is the relaxation still to come.
     assert area.values[-1] / 0.8 == pytest.approx(state.J, rel=1e-8)
@@ -123,13 +123,18 @@ def test_weight_of_the_fluid_is_hydrostatic():
         loads=[Weight((-gamma_F,), (-gamma_S,))],
     )
     ledger = Ledger()
-    low, high = (Probe((z,), "hydraulic_pressure", "displacement", "c_plus", "c_minus", "stress") for z in (0.0, 20.0))
-    scene.run(2e7, Adaptive(1e-5), [ledger, low, high], newton=Newton())
+    low, high = (Probe((z,), "fluid_potential", "displacement", "c_plus", "c_minus", "stress", "J") for z in (0.0, 20.0))
+    scene.run(2e7, Adaptive(1e-5), [ledger, low, high], newton=DampedNewton())
     length = 20.0 + high.values["displacement"][-1] - low.values["displacement"][-1]
-    fall = low.values["hydraulic_pressure"][-1] - high.values["hydraulic_pressure"][-1]
+    fall = low.values["fluid_potential"][-1] - high.values["fluid_potential"][-1]
     assert fall == pytest.approx(gamma_F * length, rel=2e-5)  # h² of linear p on 40 cells
     weight = gamma_S * 20 * 0.25 + gamma_F * ledger.fluid[-1]
-    assert low.values["stress"][-1] == pytest.approx(-weight, rel=2e-2)  # elementwise stress at the end cell
+    stress, J = low.values["stress"][-1].reshape(3, 3), low.values["J"].ravel()[-1]
+    assert stress[0, 0] == pytest.approx(-weight, rel=2e-2)  # elementwise stress at the end cell
+    # What the walls bear beside it: nothing but µ (B − I)/J tells the directions apart.
+    sideways = stress[0, 0] - TABLE_1.mu * (J - 1 / J)
+    assert stress == pytest.approx(np.diag([stress[0, 0], sideways, sideways]), rel=1e-12, abs=1e-14)
+    assert abs(J - 1) > 1e-3
     assert low.values["c_plus"][-1] * low.values["c_minus"][-1] == pytest.approx(0.15**2, rel=1e-4)
     # Round-off of p times the penalty and a last step of some 1e7 s.
     assert max(ledger.imbalance().values()) < 1e-7

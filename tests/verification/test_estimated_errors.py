@@ -17,19 +17,19 @@ from ngswell import (
     Potential,
     Roller,
     Scene,
-    Solid,
+    Spatial,
     box,
     column,
     rectangle,
 )
 from ngswell.analysis.recovery import Recovery
-from studies import free_swelling
+from studies import scenes
 
 SHAPES = {
     "segments": (lambda n: column(1.0, n), Confined(), exp(2 * x) * sin(3 * x)),
     "quadrilaterals": (lambda n: rectangle(1.0, 1.0, n, n), PlaneStrain(), sin(2 * x + 0.5) * exp(1.5 * y)),
     "triangles": (lambda n: rectangle(1.0, 1.0, n, n, triangles=True), PlaneStrain(), sin(2 * x + 0.5) * exp(1.5 * y)),
-    "hexahedra": (lambda n: box(1.0, 1.0, 1.0, n, n, n), Solid(), sin(2 * x + 0.5) * exp(1.5 * y) * cos(z)),
+    "hexahedra": (lambda n: box(1.0, 1.0, 1.0, n, n, n), Spatial(), sin(2 * x + 0.5) * exp(1.5 * y) * cos(z)),
 }
 
 
@@ -84,10 +84,10 @@ def test_the_estimate_is_the_error_of_smooth_fields(shape, order, cells, name):
 def swelling(graded):
     """The block from rest at 7000 s until its sides' bath is diluted, on 8 × 8 cells."""
     grade = {"top": 6.0, "left": 6.0, "bottom": 6.0} if graded else None
-    block = free_swelling.scene(8, 8)
+    block = scenes.free_swelling_block(8, 8)
     scene = replace(
         block,
-        mesh=rectangle(free_swelling.WIDTH, free_swelling.HEIGHT, 8, 8, grade=grade),
+        mesh=rectangle(scenes.WIDTH, scenes.HEIGHT, 8, 8, grade=grade),
         model=Potential(),
         baths=[replace(bath, treatment=None) for bath in block.baths],
     )
@@ -99,7 +99,7 @@ def swelling(graded):
 def test_the_worst_cell_of_the_block_lies_at_a_diluted_side():
     worst, report = swelling(False).worst(), swelling(False).report()
     # Half a cell from the left side or from the top, whose baths are diluted; the bottom's hardly is.
-    assert worst.place[0] < free_swelling.WIDTH / 8 or worst.place[1] > free_swelling.HEIGHT * 7 / 8
+    assert worst.place[0] < scenes.WIDTH / 8 or worst.place[1] > scenes.HEIGHT * 7 / 8
     assert worst.time == 7220.0  # when the dilution is fastest and the layer thinnest
     advice = report.splitlines()[-1]
     assert "top" in advice

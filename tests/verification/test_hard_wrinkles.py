@@ -8,10 +8,10 @@ import pytest
 from ngsolve import CF, y
 
 from ngswell import TABLE_2, Bath, Fixed, InputError, InstabilityError, Lagged, Potential, Snapshots, Stability
-from ngswell.analysis.stability import Perturbations
+from ngswell.analysis.perturbations import Perturbations
 from ngswell.closed_forms.homogeneous import homogeneous_equilibrium
-from studies.convergence import growth_rates, held_sideways, swell
-from studies.hard_wrinkles import CELLS, SKINNED, refinement, unresolved, wrinkles
+from studies.hard_cases.wrinkles import CELLS, SKINNED, refinement, unresolved, wrinkles
+from studies.limits.convergence.spectra import growth_rates, held_sideways, swell
 from tests.scenes import strip
 
 
@@ -83,7 +83,7 @@ def test_watching_does_not_change_a_run():
 
 
 def test_refusals():
-    with pytest.raises(InputError, match="Lagged"):
+    with pytest.raises(InputError, match=r"'top' looks back one step.*growth_factor"):
         strip(Lagged()).run(1.0, Fixed(1.0), [Stability()])
     with pytest.raises(InputError, match="over"):
         Stability(over=0.0)

@@ -6,7 +6,7 @@ import pytest
 from ngswell import LocalDonnan, Potential
 from ngswell.closed_forms.homogeneous import homogeneous_equilibrium
 from ngswell.physics import laws
-from studies.verification import gel, homogeneous_body, printed_drive, unrest
+from studies.limits.verification import gel, homogeneous_body, printed_drive, unrest
 
 
 @pytest.mark.parametrize("motion", ["confined", "plane strain", "3-d"])
@@ -17,12 +17,12 @@ def test_over_baths_and_charges(motion, model):
     for cfc0 in (0.0, 0.01, 0.2, 1.0):
         for bath in (1e-6, 1e-3, 0.15, 5.0):
             scene = homogeneous_body(motion, cfc0, bath, model)
-            scene.problem.restore(scene.equilibrate())
+            state = scene.state(scene.equilibrate())
             closed = homogeneous_equilibrium(gel(cfc0), bath, motion)
-            J = scene.problem.state.J(scene.problem._quadrature).ravel()
+            J = state.J(scene.problem.points).ravel()
             assert pytest.approx(np.full_like(J, closed.J), rel=1e-8) == J, (cfc0, bath)
             where = scene.mesh(*(0.5,) * scene.mesh.dim)
-            outputs = scene.problem.state.outputs()
+            outputs = state.outputs()
             for name, value in (("p", closed.p), ("c_plus", closed.c), ("cfc", closed.cfc), ("nS", closed.nS)):
                 assert outputs[name](where) == pytest.approx(value, rel=1e-7, abs=1e-9), (name, cfc0, bath)
             largest = max(largest, closed.J)

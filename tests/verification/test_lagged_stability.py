@@ -10,29 +10,30 @@ from ngswell import (
     TABLE_1,
     Averaged,
     Concentration,
+    DampedNewton,
     Fixed,
     Frozen,
     InnerLayer,
     Lagged,
     LeastSquares,
-    Newton,
     NgswellError,
     Penalty,
     Probe,
     Ramp,
     Traction,
 )
-from ngswell.analysis.stability import growth_factor, leading_eigenvalues
+from ngswell.analysis.one_step import growth_factor, leading_eigenvalues
 from ngswell.closed_forms.homogeneous import homogeneous_equilibrium, lagged_column_factor
 from ngswell.physics import donnan
-from ngswell.problem.problem import Snapshot
-from studies.oscillation import disturbed, measured_growth
+from ngswell.problem.discretisation import Snapshot
+from studies.paper.oscillation import measured_growth
+from studies.scenes import disturbed
 from tests.scenes import confined_column, quarter, strip
 
 SOFT = replace(TABLE_1, mu=0.06)
 """Here the dead load p0 exceeds µ and the strip would buckle, faster than steps of 0.1 s and more can resolve: backward
 Euler damps that, and what grows is the column's mode of the lagged boundary."""
-SHARP = Newton(tolerance=1e-12)  # disturbances of 1e-6 have to be converged, too
+SHARP = DampedNewton(tolerance=1e-12)  # disturbances of 1e-6 have to be converged, too
 
 ROUND_OFF_TO_NONLINEAR = 2e-3
 """Relative accuracy of an observed factor: some ten steps between round-off and the first effect of nonlinearity, over which
@@ -217,11 +218,21 @@ def test_the_growing_mode_of_the_strip_is_lateral():
 
 def test_fields_and_clock_stay():
     scene = strip(Lagged(Averaged()), c=Ramp((0, 0.15), (10, 0.125)), charge=Ramp((0, 1.0), (10, 0.9)))
-    end = scene.run(5.0, Fixed(5.0)).end
-    J = scene.problem.state.pointwise_charge(scene.mesh(0.01, 0.4))
-    growth_factor(scene, 1.0)
-    assert (scene.problem.vector == end.values).all()
-    assert scene.problem.state.pointwise_charge(scene.mesh(0.01, 0.4)) == J
+    result, point = scene.run(5.0, Fixed(5.0)), scene.mesh(0.01, 0.4)
+    end, problem = result.end, scene.problem
+    problem.initialise()
+    started = problem.state.pointwise_charge(point)
+    problem.restore(end)
+    kept, charge = end.values.copy(), problem.state.pointwise_charge(point)
+    assert charge != pytest.approx(started, rel=1e-3)  # something to stay
+    assert result.state.pointwise_charge(point) == charge
+    for state in (None, end):
+        growth_factor(scene, 1.0, state)
+        assert problem.time == end.time == 5.0
+        assert (problem.vector == kept).all()
+        assert (end.values == kept).all()
+        assert problem.state.pointwise_charge(point) == charge
+        assert result.state.pointwise_charge(point) == charge
 
 
 def with_eigenvalues(blocks, size=200):

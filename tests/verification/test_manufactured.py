@@ -1,6 +1,6 @@
 """Observed orders of the whole nonlinear system against manufactured solutions, in space, in time and for every kinematics.
 
-`studies/manufactured.py` has the equations a second time, and the sources. Each claim has a control: with a term taken
+`studies.limits.manufactured` has the equations a second time, and the sources. Each claim has a control: with a term taken
 out of the model, or put in wrongly, the order is gone.
 """
 
@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from ngsolve import CF
 
-from ngswell import Axisymmetric, PlaneStrain, Solid
+from ngswell import Axisymmetric, PlaneStrain, Spatial
 from ngswell.mesh.points import points
 from ngswell.physics import kinematics as motions
 from ngswell.physics import laws
-from studies.manufactured import (
+from studies.limits.manufactured import (
     BATH,
     FAST,
     KINDS,
@@ -113,8 +113,8 @@ def no_convection(patch):
     """Cations do not move with the fluid."""
     transport = laws.transport
 
-    def without(material, nF, c, cfc, *gradients):
-        flux = transport(material, nF, c, cfc, *gradients)
+    def without(material, J, c, cfc, *gradients):
+        flux = transport(material, J, c, cfc, *gradients)
         return flux._replace(cations=flux.cations - c * flux.fluid)
 
     patch.setattr(laws, "transport", without)
@@ -130,8 +130,8 @@ def no_electro_osmosis(patch):
     """Darcy's law alone: the field does not drive the fluid."""
     transport = laws.transport
 
-    def without(material, nF, c, cfc, drive, *gradients):
-        return transport(material, nF, c, cfc, drive, *gradients)._replace(fluid=-material.K * drive)
+    def without(material, J, c, cfc, drive, *gradients):
+        return transport(material, J, c, cfc, drive, *gradients)._replace(fluid=-material.K * drive)
 
     patch.setattr(laws, "transport", without)
 
@@ -148,7 +148,7 @@ def flat_measure(patch):
 
 def reference_area(patch):
     """The bath's efflux per reference area."""
-    for motion in (PlaneStrain, Axisymmetric, Solid):
+    for motion in (PlaneStrain, Axisymmetric, Spatial):
         patch.setattr(motion, "area_stretch", lambda self, u: CF(1.0))
 
 

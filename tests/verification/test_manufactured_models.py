@@ -1,15 +1,16 @@
 """Observed orders of the model `Potential`, and of baths that are met exactly, against manufactured solutions.
 
-The same cases and sources as in test_manufactured.py, from equations written a second time in studies/manufactured.py.
+The same cases and sources as in test_manufactured.py, from equations written a second time in studies.limits.manufactured.
 """
+
+from dataclasses import replace
 
 import pytest
 
 from ngswell import Concentration, Essential, Multiplier, Nitsche, Penalty, PlaneStrain
-from ngswell.baths import weak
 from ngswell.models import potential
 from ngswell.physics import laws
-from studies.manufactured import (
+from studies.limits.manufactured import (
     BATH,
     FAST,
     KINDS,
@@ -144,8 +145,8 @@ def no_convection(patch):
     """Cations do not move with the fluid."""
     right = laws.transport_by_potentials
 
-    def without(material, nF, bath, *given):
-        flux = right(material, nF, bath, *given)
+    def without(material, J, bath, *given):
+        flux = right(material, J, bath, *given)
         return flux._replace(cations=flux.cations - bath * flux.fluid)
 
     patch.setattr(laws, "transport_by_potentials", without)
@@ -177,15 +178,16 @@ def test_a_wrong_term_has_no_order(monkeypatch, spoil, name):
 
 def test_nitsche_without_the_flux_is_a_soft_penalty(monkeypatch):
     # γ K/h excess = W·N: the excess, and with it everything, falls with h only.
-    right = weak._nitsche
+    right = Nitsche.terms
 
-    def without_flux(treatment, state, *given):
-        still = type(state)(state.setting, *(getattr(state, name) for name in Concentration.unknowns))
+    def without_flux(treatment, contact):
+        state = contact.state
+        still = type(state)(state.context, *(getattr(state, name) for name in Concentration.unknowns))
         none = laws.Transport(*(0.0 * state.kinematics.normal,) * 3)
         object.__setattr__(still, "transport", lambda frame: none)
-        return right(treatment, still, *given)
+        return right(treatment, replace(contact, state=still))
 
-    monkeypatch.setattr(weak, "_nitsche", without_flux)
+    monkeypatch.setattr(Nitsche, "terms", without_flux)
     coarse, fine = (
         errors("plane strain", 3, n, SLOW, fields=in_equilibrium, bath=exact_bath(Nitsche(adjoint="none"))) for n in (4, 8)
     )

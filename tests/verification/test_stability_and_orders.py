@@ -24,10 +24,11 @@ from ngswell import (
     Traction,
     rectangle,
 )
-from ngswell.analysis.stability import growth_factor
+from ngswell.analysis.one_step import growth_factor
 from ngswell.closed_forms.homogeneous import homogeneous_equilibrium, lagged_column_factor
 from ngswell.models.concentration import State
-from studies.oscillation import disturbed, measured_growth
+from studies.paper.oscillation import measured_growth
+from studies.scenes import disturbed
 from tests.scenes import FALLING, P0, confined_column, strip
 
 

@@ -10,12 +10,12 @@ from ngswell import (
     ESDIRK4,
     Adaptive,
     Concentration,
+    DampedNewton,
     Essential,
     Fixed,
     InputError,
     Lagged,
     Ledger,
-    Newton,
     Nitsche,
     Penalty,
     Potential,
@@ -23,7 +23,7 @@ from ngswell import (
 )
 from tests.scenes import FALLING, confined_column
 
-EXACT = Newton(tolerance=1e-13, most_iterations=40)
+EXACT = DampedNewton(tolerance=1e-13, most_iterations=40)
 
 MODELS = {
     "Concentration": (Concentration(), Penalty(relative=1e4)),
@@ -83,15 +83,15 @@ def test_ledger_closes_to_what_the_nonlinear_solves_leave(choice):
         column(choice).run(300.0, Adaptive(1e-3), [ledger], newton=newton)
         return max(ledger.imbalance().values())
 
-    assert imbalance(Newton()) < 1e-10  # quadratic remainders of full Newton iterations
+    assert imbalance(DampedNewton()) < 1e-10  # quadratic remainders of full Newton iterations
     loose = imbalance(None)
     assert 1e-10 < loose < 1e-3  # solves to 3e-6; stiff fluxes amplify what they leave, up to the tolerance itself
 
 
 def test_old_matrices_serve_and_change_nothing():
     kept, own = Probe((0.5,), "displacement"), Probe((0.5,), "displacement")
-    few = column("Potential").run(300.0, Fixed(10.0, ESDIRK4), [kept], newton=Newton(1e-10, slowest=0.3))
-    many = column("Potential").run(300.0, Fixed(10.0, ESDIRK4), [own], newton=Newton(1e-10))
+    few = column("Potential").run(300.0, Fixed(10.0, ESDIRK4), [kept], newton=DampedNewton(1e-10, slowest=0.3))
+    many = column("Potential").run(300.0, Fixed(10.0, ESDIRK4), [own], newton=DampedNewton(1e-10))
     assert few.factorisations < many.factorisations / 10
     # Both solve to 1e-10 of the fields, 0.5 mm for u; 30 steps of five stages.
     assert kept.values["displacement"] == pytest.approx(own.values["displacement"], abs=150 * 1e-10 * 0.5)
@@ -101,9 +101,9 @@ def test_vanishing_anions_are_left_to_backward_euler():
     # At 1e-9 mol/l stages that weigh rates negatively have no solution; the step says what it tried, the run goes on.
     scene = confined_column(Essential(), c=1e-9, model=Potential(3), cells=10, initial=(0.15, 0.0))
     result = scene.run(1e5, Adaptive(1e-2))
-    reasons = [reason for step in result.steps for reason in step.rejected]
+    reasons = [str(rejection) for step in result.steps for rejection in step.rejected]
     assert any("stalls" in reason or "positive" in reason or "error" in reason for reason in reasons)
-    salt = scene.problem.vector[scene.problem.ranges["salt"]]
+    salt = result.end.values[scene.problem.ranges["salt"]]
     assert salt[: scene.mesh.nv].min() > 0  # values at the vertices
     assert salt[: scene.mesh.nv].max() < 1e-6
 

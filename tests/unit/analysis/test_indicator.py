@@ -22,7 +22,7 @@ from ngswell import (
     Ramp,
     Roller,
     Scene,
-    Solid,
+    Spatial,
     Uncharged,
     box,
     column,
@@ -81,7 +81,7 @@ UNCHARGED = Material(mu=0.12, lam=0.02, nS0=0.25, cfc0=0.0, D_plus=5e-4, D_minus
 
 
 def scene(mesh, model=MODELS["Potential"], kinematics=None, treatment=None, charge=FULL) -> Scene:
-    kinematics = kinematics or {1: Confined, 2: PlaneStrain, 3: Solid}[mesh.dim]()
+    kinematics = kinematics or {1: Confined, 2: PlaneStrain, 3: Spatial}[mesh.dim]()
     supports = [Roller("bottom", kinematics.directions)]
     if isinstance(kinematics, Axisymmetric):
         supports.append(Roller("left", "r"))
@@ -240,11 +240,13 @@ def test_the_observer_keeps_the_largest_error_of_each_cell():
     assert f"Worst cell: {worst.cell} of 64" in report
     assert "Thinner cells along top" in report
 
-    coarseness.when = None
-    watched.run(125.0, Fixed(25.0), [coarseness], resume=result.end)  # goes on, on the same mesh
-    assert coarseness.time.tolist() == [0.0, 50.0, 100.0, 100.0, 125.0]
+    # A second run goes on with the records, on the same mesh.
+    every = Coarseness()
+    watched.run(100.0, Fixed(50.0), [every])
+    watched.run(125.0, Fixed(25.0), [every], resume=result.end)
+    assert every.time.tolist() == [0.0, 50.0, 100.0, 100.0, 125.0]
     with pytest.raises(InputError, match="another mesh"):
-        scene(rectangle(1.0, 1.0, 2, 2)).run(10.0, Fixed(10.0), [coarseness])
+        scene(rectangle(1.0, 1.0, 2, 2)).run(10.0, Fixed(10.0), [every])
 
 
 def test_a_body_at_rest_has_nothing_to_resolve():

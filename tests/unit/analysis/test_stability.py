@@ -4,15 +4,8 @@ from dataclasses import replace
 
 import pytest
 
-from ngswell import (
-    TABLE_1,
-    Fixed,
-    Frozen,
-    InputError,
-    NgswellError,
-    Traction,
-)
-from ngswell.analysis.stability import growth_factor
+from ngswell import TABLE_1, Fixed, Frozen, InputError, NgswellError, Traction
+from ngswell.analysis.one_step import growth_factor
 from tests.scenes import confined_column, strip
 
 

@@ -6,19 +6,7 @@ import numpy as np
 import pytest
 from ngsolve import CF
 
-from ngswell import (
-    Bath,
-    Blend,
-    Fixed,
-    Frozen,
-    InputError,
-    Lagged,
-    Multiplier,
-    Nitsche,
-    Penalty,
-    Ramp,
-    Scene,
-)
+from ngswell import Bath, Blend, Fixed, Frozen, InputError, Lagged, Multiplier, Nitsche, Penalty, Ramp
 from tests.scenes import strip
 
 
@@ -47,7 +35,7 @@ from tests.scenes import strip
         (lambda: Nitsche(math.inf), "finite, got inf"),
         (lambda: Nitsche(math.nan), "finite, got nan"),
         (lambda: Nitsche(adjoint="antisymmetric"), "'antisymmetric' is none of 'symmetric', 'skew', 'none'"),
-        (lambda: Bath("top", c=0.15, treatment=Nitsche), r"none of Penalty\(...\), Nitsche\(\), Multiplier\(\)"),
+        (lambda: Bath("top", c=0.15, treatment=Nitsche), r"has to be Penalty\(...\), Nitsche\(\).*got the class Nitsche"),
         (lambda: Bath("top", c="0.1"), "concentration.*number, got '0.1'"),
         (lambda: Bath("top", c=True), "got True"),
         (lambda: Bath("top", c=1e-300), "1e-300 mol/l is outside"),
@@ -76,7 +64,7 @@ def test_multipliers_stand_beside_weak_baths_that_they_touch(other):
 
 def test_multipliers_beside_prescribed_values_would_be_singular(monkeypatch):
     # Control: what is refused cannot be solved.
-    monkeypatch.setattr(Scene, "_check_multipliers", lambda scene: None)
+    monkeypatch.setattr(Multiplier, "check_in", lambda *arguments: None)
     baths = [Bath("top", c=0.15, treatment=Multiplier()), Bath("left", c=0.15, treatment=Lagged())]
     problem = strip(baths=baths, cells=(2, 3)).problem
     problem.initialise()

@@ -17,7 +17,8 @@ from ngswell import (
     column,
     rectangle,
 )
-from ngswell.baths.sampling import BathBoundary, Slopes
+from ngswell.baths.boundary import BathBoundary
+from ngswell.baths.lagged import Slopes
 from ngswell.mesh.points import vertices
 from ngswell.physics import donnan
 from tests.scenes import confined_column, quarter, strip

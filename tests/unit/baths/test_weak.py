@@ -3,17 +3,9 @@
 import pytest
 from ngsolve import L2, LinearForm, ds, x
 
-from ngswell import (
-    Confined,
-    Penalty,
-    PlaneStrain,
-    Roller,
-    Solid,
-    box,
-    column,
-    rectangle,
-)
-from ngswell.baths.weak import normal_size
+from ngswell import Confined, Penalty, PlaneStrain, Roller, Spatial, box, column, rectangle
+from ngswell.baths.treatment import normal_size
+from ngswell.problem.forms import form
 from tests.scenes import confined_column, strip
 
 
@@ -25,7 +17,7 @@ def test_efflux_is_per_current_area():
     problem.vector[problem.ranges["p"]] += 0.01
     efflux = next(t for t in problem.terms if (t.balance, t.name) == ("fluid", "efflux"))
     vector = problem.fields.vec.CreateVector()
-    problem.form(efflux).Apply(problem.fields.vec, vector)
+    form(problem, [efflux]).Apply(problem.fields.vec, vector)
     total = vector.FV().NumPy()[problem.ranges["p"]].sum()
     assert total == pytest.approx(0.01 * 0.02 * 1.2, rel=1e-12)
 
@@ -40,7 +32,7 @@ def test_relative_penalty_is_a_multiple_of_K_over_h(treatment, h):
         problem.vector[problem.ranges["p"]] += 0.01
         efflux = next(t for t in problem.terms if (t.balance, t.name) == ("fluid", "efflux"))
         vector = problem.fields.vec.CreateVector()
-        problem.form(efflux).Apply(problem.fields.vec, vector)
+        form(problem, [efflux]).Apply(problem.fields.vec, vector)
         results.append(vector.FV().NumPy().sum())
     assert results[0] == pytest.approx(results[1], rel=1e-12)
 
@@ -51,9 +43,9 @@ def test_relative_penalty_is_a_multiple_of_K_over_h(treatment, h):
         (column(1.0, 4), Confined(), 1 / 4),
         (rectangle(1.0, 1.0, 4, 5), PlaneStrain(), 1 / 5),
         (rectangle(1.0, 1.0, 4, 5, triangles=True), PlaneStrain(), 1 / 5),
-        (box(1.0, 1.0, 1.0, 2, 2, 3), Solid(), 1 / 3),
-        (box(1.0, 1.0, 1.0, 2, 2, 3, cells="prisms"), Solid(), 1 / 3),
-        (box(1.0, 1.0, 1.0, 2, 2, 3, cells="tetrahedra"), Solid(), 1 / 3),
+        (box(1.0, 1.0, 1.0, 2, 2, 3), Spatial(), 1 / 3),
+        (box(1.0, 1.0, 1.0, 2, 2, 3, cells="prisms"), Spatial(), 1 / 3),
+        (box(1.0, 1.0, 1.0, 2, 2, 3, cells="tetrahedra"), Spatial(), 1 / 3),
     ],
     ids=["column", "quadrilaterals", "triangles", "hexahedra", "prisms", "tetrahedra"],
 )

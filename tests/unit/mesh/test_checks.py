@@ -4,18 +4,7 @@ import pytest
 from ngsolve import Mesh
 from ngsolve.meshes import MakeStructured2DMesh
 
-from ngswell import (
-    TABLE_2,
-    Bath,
-    InputError,
-    PlaneStrain,
-    Roller,
-    Scene,
-    box,
-    check_mesh,
-    column,
-    rectangle,
-)
+from ngswell import TABLE_2, Bath, InputError, PlaneStrain, Roller, Scene, box, check_mesh, column, rectangle
 
 
 def moved(mesh, number, place):

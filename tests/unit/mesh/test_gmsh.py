@@ -7,10 +7,7 @@ import numpy as np
 import pytest
 from ngsolve import CF, Integrate
 
-from ngswell import (
-    InputError,
-    read_mesh,
-)
+from ngswell import InputError, read_mesh
 from tests.meshes import (
     gmsh_2d,
     write_gmsh,

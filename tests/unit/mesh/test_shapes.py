@@ -7,13 +7,7 @@ import pytest
 from netgen.occ import Axes, Box, Glue, WorkPlane, Z
 from ngsolve import CF, ET, VOL, Integrate, specialcf
 
-from ngswell import (
-    InputError,
-    box,
-    column,
-    from_occ,
-    rectangle,
-)
+from ngswell import InputError, box, column, from_occ, rectangle
 from tests.meshes import MESHES, OUTWARD, SIDES_2D, SIDES_3D, quarter_disc
 
 

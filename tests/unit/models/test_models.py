@@ -2,13 +2,7 @@
 
 import pytest
 
-from ngswell import (
-    Concentration,
-    InputError,
-    Multiplier,
-    Nitsche,
-    Potential,
-)
+from ngswell import Concentration, InputError, Multiplier, Nitsche, Potential
 from tests.scenes import confined_column, strip
 
 

@@ -6,6 +6,7 @@ from ngsolve import CF, Det, Inv
 
 from ngswell import TABLE_1, TABLE_2, rectangle
 from ngswell.physics import laws
+from ngswell.physics.solid import extra_stress, small_strain_moduli
 
 MESH = rectangle(1, 1, 1, 1)  # a mesh point does not keep its mesh alive
 POINT = MESH(0.3, 0.4)
@@ -16,17 +17,34 @@ def at(field):
     return np.array(field(POINT))
 
 
-def test_stress_derives_from_the_energy():
-    F = DEFORMATION.MakeVariable()
-    piola = laws.solid_energy(F, TABLE_2).Diff(F)
-    assert at(piola * F.trans) == pytest.approx(at(laws.extra_stress(F, TABLE_2)), rel=1e-12)
+def printed_stress(F, m):
+    """Kirchhoff extra stress as (18) prints it, of a 3 × 3 array."""
+    J = np.linalg.det(F)
+    volumetric = m.lam * (1 - m.nS0) ** 2 * (J / (1 - m.nS0) - J / (J - m.nS0))
+    return m.mu * (F @ F.T - np.eye(3)) + volumetric * np.eye(3)
+
+
+def test_the_stress_of_the_energy_is_the_printed_one():
+    F = np.array([[1.3, 0.2, 0.1], [-0.1, 1.6, 0.0], [0.05, 0.0, 0.9]])
+    field = CF(tuple(F.ravel()), dims=(3, 3))
+    found = at(extra_stress(field, TABLE_2)).reshape(3, 3) * np.linalg.det(F)
+    assert found == pytest.approx(printed_stress(F, TABLE_2), rel=1e-12)  # round-off
+
+
+def stretched(J):
+    return CF((J, 0, 0, 0, 1, 0, 0, 0, 1), dims=(3, 3))
 
 
 def test_stress_vanishes_in_the_reference_state_and_has_its_pole_at_the_compression_point():
-    assert at(laws.extra_stress(CF((1, 0, 0, 1), dims=(2, 2)), TABLE_1)) == pytest.approx(np.zeros(4), abs=1e-15)
-    stiff = [abs(at(laws.extra_stress(CF((J, 0, 0, 1), dims=(2, 2)), TABLE_1))[0]) for J in (0.26, 0.2501, 0.250001)]
+    assert at(extra_stress(stretched(1.0), TABLE_1)) == pytest.approx(np.zeros(9), abs=1e-15)
+    # Kirchhoff stress, J times Cauchy's, grows as 1/(J − nS0).
+    stiff = [J * abs(at(extra_stress(stretched(J), TABLE_1))[0]) for J in (0.26, 0.2501, 0.250001)]
     assert stiff[1] > 50 * stiff[0]
-    assert stiff[2] > 90 * stiff[1]  # grows as 1/(J − nS0)
+    assert stiff[2] > 90 * stiff[1]
+
+
+def test_small_strain_moduli_of_the_papers_law_are_its_parameters():
+    assert small_strain_moduli(TABLE_1) == pytest.approx((TABLE_1.mu, TABLE_1.lam), rel=1e-12)
 
 
 def test_volume_fractions_and_charge():
@@ -48,9 +66,8 @@ def gradients(c, cfc, RT, bath_gradient=0.0):
 
 
 def flows(material, c, cfc, grad_p, grad_c, grad_cfc, nF=0.8):
-    return [
-        at(flux) for flux in laws.transport(material, CF(nF), CF(c), CF(cfc), *map(tuple_field, (grad_p, grad_c, grad_cfc)))
-    ]
+    J = CF(material.nS0 / (1 - nF))
+    return [at(flux) for flux in laws.transport(material, J, CF(c), CF(cfc), *map(tuple_field, (grad_p, grad_c, grad_cfc)))]
 
 
 def tuple_field(values):

@@ -6,10 +6,7 @@ import numpy as np
 import pytest
 from ngsolve import CF, x
 
-from ngswell import (
-    InputError,
-    Material,
-)
+from ngswell import InputError, Material
 from tests.scenes import NUMBERS, strip
 
 

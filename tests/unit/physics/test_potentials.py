@@ -43,19 +43,20 @@ def virtual_bath(dilution=1.0):
 
 
 def transport_arguments(material, dilution=1.0, weight=(0.0, 0.0)):
-    """nF, c, cfc and the gradients of p, c and cfc that the virtual bath amounts to, eqs. (23) and (38)."""
+    """J, c, cfc and the gradients of p, c and cfc that the virtual bath amounts to, eqs. (23) and (38)."""
     bath, P, cfc, nF = virtual_bath(dilution)
     m = material
     p = donnan.pressure(bath, cfc, m.RT, P, m.Gamma, m.phi, m.phi_bath)
     c = donnan.cations(bath, cfc, m.Gamma)
-    return nF, c, cfc, gradient(p) - CF(weight), gradient(c), gradient(cfc)
+    return m.nS0 / (1 - nF), c, cfc, gradient(p) - CF(weight), gradient(c), gradient(cfc)
 
 
 def both_forms(material, dilution=1.0, weight=(0.0, 0.0)):
     """Fluxes by p and c and by P and c̃, the fluid's `weight` [N/mm³] taken from either drive."""
     bath, P, cfc, nF = virtual_bath(dilution)
     plain = laws.transport(material, *transport_arguments(material, dilution, weight))
-    return plain, laws.transport_by_potentials(material, nF, bath, cfc, gradient(P) - CF(weight), gradient(bath))
+    J = material.nS0 / (1 - nF)
+    return plain, laws.transport_by_potentials(material, J, bath, cfc, gradient(P) - CF(weight), gradient(bath))
 
 
 def roundoff(material, dilution):
@@ -123,6 +124,6 @@ def test_fluxes_have_a_limit_in_pure_water():
 
 def test_nothing_flows_where_the_bath_is_one():
     bath, P, cfc, nF = CF(0.3), CF(0.1), *virtual_bath()[2:]
-    flux = laws.transport_by_potentials(TABLE_2, nF, bath, cfc, gradient(P), gradient(bath))
+    flux = laws.transport_by_potentials(TABLE_2, TABLE_2.nS0 / (1 - nF), bath, cfc, gradient(P), gradient(bath))
     for field in flux:
         assert np.abs(at(field)).max() == 0.0

@@ -24,13 +24,15 @@ from ngswell import (
     PowerLaw,
     Roller,
     Scene,
-    Solid,
+    Spatial,
     Traction,
     Weight,
     box,
     column,
     rectangle,
 )
+from ngswell.models.term import Kind
+from ngswell.problem.forms import form
 from tests.scenes import block, deformed, strip
 
 
@@ -47,7 +49,7 @@ def shapes(motion):
             ("top", "right"), lambda size: (0.0, size),
         ),
         "3-d": (
-            box(1.0, 1.0, 1.0, 1, 1, 2), Solid(), [Roller("bottom", "xyz")], ("top", "right"),
+            box(1.0, 1.0, 1.0, 1, 1, 2), Spatial(), [Roller("bottom", "xyz")], ("top", "right"),
             lambda size: (0.2 * size, 0.0, size),
         ),
     }[motion]  # fmt: skip
@@ -132,9 +134,9 @@ def check_terms(problem):
     problem.residual(total)
     summed = np.zeros(total.size)
     for term in problem.terms:
-        problem.form(term).Apply(problem.fields.vec, part)
+        form(problem, [term]).Apply(problem.fields.vec, part)
         assert np.abs(part.FV().NumPy()).max() > 0, f"{term} does nothing"
-        summed += part.FV().NumPy() / (0.7 if term.kind == "rate" else 1.0)
+        summed += part.FV().NumPy() / (0.7 if term.kind is Kind.RATE else 1.0)
     assert summed == pytest.approx(total.FV().NumPy(), abs=1e-13)
 
 
@@ -163,11 +165,11 @@ def test_a_scene_has_only_the_terms_it_needs():
 def test_table_2_is_admissible_and_a_passed_pole_is_not():
     problem = strip(material=TABLE_2, loads=[]).problem
     problem.initialise()
-    assert problem.inadmissible() is None
+    assert problem.admissible.violation() is None
     problem.fields.components[0].Set((0 * x, -0.8 * y))
-    name, where = problem.inadmissible()
+    name, where = problem.admissible.violation()
     assert "J − nS0" in name
     assert len(where) == 2
     problem.initialise()
     problem.vector[problem.ranges["c"]] = np.nan
-    assert problem.inadmissible() is not None
+    assert problem.admissible.violation() is not None

@@ -2,7 +2,7 @@
 
 import json
 import os
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import ngsolve
@@ -36,7 +36,9 @@ from ngswell import (
     TwoLevelSolver,
     read_checkpoint,
 )
+from ngswell.files import read_tree, write_tree
 from ngswell.observers.base import Observer
+from ngswell.run.digest import setup_digest
 from ngswell.solve.direct import CondensedSolver, LinearSolver, best_solver
 from tests.scenes import FALLING, confined_column, strip
 
@@ -82,18 +84,23 @@ def watched(dimension):
 
 
 def series(observers):
-    """All that was recorded, as one dictionary of arrays; what the clock says left out."""
+    """All that was recorded, as one tree of arrays; what the clock says left out."""
     found = {}
     for number, observer in enumerate(observers):
-        found |= {f"{number} time": observer.time}
-        found |= {f"{number} {key}": value for key, value in observer.memory().items() if key != "counts"}
+        found[str(number)] = {key: value for key, value in observer.state().items() if key != "counts"}
+        found[f"{number} time"] = observer.time
     return found
 
 
-def check_equal(one, other):
-    assert one.keys() == other.keys()
+def check_equal(one, other, at=""):
+    """Two trees of arrays have the same branches and, to the bit, the same entries."""
+    assert one.keys() == other.keys(), at
     for key, value in one.items():
-        np.testing.assert_array_equal(value, other[key], err_msg=key)
+        if isinstance(value, dict):
+            check_equal(value, other[key], f"{at}/{key}")
+        else:
+            assert np.asarray(value).dtype == np.asarray(other[key]).dtype, f"{at}/{key}"
+            np.testing.assert_array_equal(value, other[key], err_msg=f"{at}/{key}", strict=True)
 
 
 SUDDEN = Ramp((0, 0.15), (10, 0.15), (10.01, 0.08))
@@ -115,12 +122,12 @@ CASES = {
 def test_a_run_resumed_after_a_step_is_the_same_to_the_bit(case, name, tmp_path, one_thread):
     changes, steps = CASES[case]
 
-    def run(scene, observers, resume=None):
-        return scene.run(40.0, steps, observers, resume=resume, solver=direct(name))
+    def run(scene, observers, **more):
+        return scene.run(40.0, steps, observers, solver=direct(name), **more)
 
     checkpoint, before = Checkpoint(tmp_path / "run", every=0.0), watched(1)
     copies = Collect(checkpoint.path)
-    through = run(confined_column(cells=8, **changes), [*before, copies, checkpoint])
+    through = run(confined_column(cells=8, **changes), [*before, copies], checkpoint=checkpoint)
     assert len(copies.copies) == len(through.steps)  # one from the start on; the last step's own is `checkpoint.path`
     if case == "rejections":
         assert through.rejections
@@ -129,7 +136,7 @@ def test_a_run_resumed_after_a_step_is_the_same_to_the_bit(case, name, tmp_path,
     stride = 1 + len(copies.copies) // 12
     for path in [middle, *copies.copies[::stride], checkpoint.path]:
         restart, observers = read_checkpoint(path), watched(1)
-        resumed = run(again, observers, restart)
+        resumed = run(again, observers, resume=restart)
         assert resumed.end.time == through.end.time
         np.testing.assert_array_equal(resumed.end.values, through.end.values)
         assert resumed.steps == through.steps
@@ -145,10 +152,62 @@ def test_from_its_state_alone_a_run_goes_on_within_newtons_tolerance_only(tmp_pa
 
     checkpoint = Checkpoint(tmp_path / "run", every=0.0)
     copies = Collect(checkpoint.path)
-    through = run(observers=[copies, checkpoint])
+    through = run(observers=[copies], checkpoint=checkpoint)
     restart = read_checkpoint(copies.copies[5])
     assert run(resume=restart).end.values.tolist() == through.end.values.tolist()
     assert run(resume=restart.snapshot).end.values.tolist() != through.end.values.tolist()
+
+
+class Forgetful(Observer):
+    """Starts anew in a resumed run: tells from where it goes on."""
+
+    def start(self, problem, begin, until):
+        self.begun, self.seen = begin, []
+
+    def observe(self, problem, step):
+        self.seen.append(step.time)
+
+
+class Halt(Observer):
+    """Ends a run in its midst, with an error of its own."""
+
+    def observe(self, problem, step):
+        if step.time > 15.0:
+            raise RuntimeError("halted")
+
+
+def test_a_script_that_is_run_twice_goes_on_by_itself(tmp_path, one_thread):
+    def script(folder, *more, **options):
+        folder.mkdir(exist_ok=True)
+        observers, scene = watched(1), confined_column(None, c=FALLING, model=Potential(), cells=8)
+        checkpoint = Checkpoint(folder / "run", every=0.0, **options)
+        return scene.run(40.0, Adaptive(1e-3), [*observers, *more], checkpoint=checkpoint), observers
+
+    def check_same(result, observers):
+        assert result.end.time == through.end.time
+        np.testing.assert_array_equal(result.end.values, through.end.values)
+        assert result.steps == through.steps
+        assert (result.factorisations, result.solves) == (through.factorisations, through.solves)
+        check_equal(series(observers), series(before))
+
+    through, before = script(tmp_path / "whole")
+    halted, file, forgetful = tmp_path / "halted", tmp_path / "halted" / "run", Forgetful()
+    with pytest.raises(RuntimeError, match="halted"):
+        script(halted, Halt())
+    reached = read_checkpoint(file).snapshot.time
+    assert 0.0 < reached < through.end.time
+    check_same(*script(halted, forgetful))
+    assert (forgetful.begun, forgetful.seen) == (reached, [step.time for step in through.steps if step.time > reached])
+    finished = file.read_bytes()
+    check_same(*script(halted, forgetful))  # the run is over: nothing is computed
+    assert (forgetful.begun, forgetful.seen) == (40.0, [])
+    assert file.read_bytes() == finished
+
+    check_same(*script(halted, forgetful, overwrite=True))
+    assert (forgetful.begun, len(forgetful.seen)) == (0.0, len(through.steps))
+    with pytest.raises(RuntimeError, match="halted"):
+        script(halted, Halt(), overwrite=True)
+    assert read_checkpoint(file).snapshot.time == reached  # of the new run, in place of the finished one
 
 
 def test_with_an_iterative_solver_the_rest_is_the_same_to_its_tolerance(tmp_path, one_thread):
@@ -158,7 +217,7 @@ def test_with_an_iterative_solver_the_rest_is_the_same_to_its_tolerance(tmp_path
 
     checkpoint = Checkpoint(tmp_path / "run", every=0.0)
     copies = Collect(checkpoint.path)
-    through = run(observers=[copies, checkpoint])
+    through = run(observers=[copies], checkpoint=checkpoint)
     resumed = run(resume=read_checkpoint(copies.copies[3]))
     # What GMRES leaves, 1e-8 of a correction, may differ: it starts on the other coarse level. Corrections are below 1.
     assert resumed.end.values == pytest.approx(through.end.values, abs=1e-8)
@@ -170,8 +229,9 @@ def files(folder):
 
 def test_a_vtk_series_goes_on_from_an_older_checkpoint(tmp_path, one_thread):
     def run(folder, until=30.0, resume=None, every=0.0, overwrite=False):
-        observers = [VTK(folder / "series", "p", overwrite=overwrite), Checkpoint(folder / "run", every)]
-        strip(None, c=FALLING, model=Potential(), cells=(1, 4)).run(until, Fixed(5.0), observers, resume=resume)
+        scene = strip(None, c=FALLING, model=Potential(), cells=(1, 4))
+        observers, checkpoint = [VTK(folder / "series", "p", overwrite=overwrite)], Checkpoint(folder / "run", every)
+        scene.run(until, Fixed(5.0), observers, resume=resume, checkpoint=checkpoint)
 
     os.chdir(tmp_path)  # observers are told apart by the path they were given
     here = Path(".")
@@ -186,14 +246,14 @@ def test_a_vtk_series_goes_on_from_an_older_checkpoint(tmp_path, one_thread):
     seen = []
 
     class Look(Observer):
-        def observe(self, problem, report):
+        def observe(self, problem, step):
             listed = [line.split('"')[3] for line in Path("series.pvd").read_text().splitlines() if "DataSet" in line]
             assert all(Path(name).read_bytes().rstrip().endswith(b"</VTKFile>") for name in listed)
             seen.append(len(listed))
 
-    observers = [VTK(here / "series", "p"), Look(), Checkpoint(here / "run")]
+    observers, checkpoint = [VTK(here / "series", "p"), Look()], Checkpoint(here / "run")
     scene = strip(None, c=FALLING, model=Potential(), cells=(1, 4))
-    scene.run(30.0, Fixed(5.0), observers, resume=read_checkpoint("run"))
+    scene.run(30.0, Fixed(5.0), observers, resume=read_checkpoint("run"), checkpoint=checkpoint)
     assert seen == [4, 5, 6, 7]  # pieces beyond the checkpoint are not named until they are written again
     assert files(tmp_path) == through
     (tmp_path / "series_step00001.vtu").unlink()
@@ -205,7 +265,7 @@ def test_a_vtk_series_goes_on_from_an_older_checkpoint(tmp_path, one_thread):
 def written(tmp_path_factory):
     """A finished run of a small column in a file."""
     path = tmp_path_factory.mktemp("written") / "run"
-    confined_column(cells=4).run(4.0, Fixed(1.0), [Probe((0.5,), "J"), Checkpoint(path)])
+    confined_column(cells=4).run(4.0, Fixed(1.0), [Probe((0.5,), "J")], checkpoint=Checkpoint(path))
     return path
 
 
@@ -234,7 +294,7 @@ def test_another_scene_is_named_by_the_part_that_differs(written, changes, part)
 def test_fields_of_position_and_laws_count_by_their_values():
     def digest(**changes):
         material = replace(ngswell.TABLE_1, **changes)
-        return ngswell.run.restart.parts(confined_column(cells=4, material=material))["material"]
+        return setup_digest(confined_column(cells=4, material=material))["material"]
 
     stiff = ngsolve.x + 0.24
     assert digest(mu=stiff) == digest(mu=0.24 + ngsolve.x)
@@ -242,45 +302,127 @@ def test_fields_of_position_and_laws_count_by_their_values():
     assert digest(permeability=lambda K, J, nS: K * J) != digest(permeability=lambda K, J, nS: K * J * J)
     blend = [ngswell.Blend(Ramp((0, 0.15)), Ramp((0, 0.15), (9, 0.1)), weight) for weight in (2 * ngsolve.x, ngsolve.x)]
     scenes = [confined_column(cells=4, baths=[Bath("top", c=c)], initial=(0.15, 0.0)) for c in blend]
-    one, other = (ngswell.run.restart.parts(scene) for scene in scenes)
+    one, other = (setup_digest(scene) for scene in scenes)
     assert {name for name in one if one[name] != other[name]} == {"baths"}
+
+
+def solid_law(energy):
+    """A solid law of the name Law, whatever its energy."""
+
+    @dataclass(frozen=True)
+    class Law:
+        def energy(self, deformation, material):
+            return energy(deformation, material)
+
+    return Law()
+
+
+def test_solid_laws_of_one_name_are_told_apart_by_their_stresses():
+    def digest(energy):
+        return setup_digest(confined_column(cells=4, material=replace(ngswell.TABLE_1, solid=solid_law(energy))))["material"]
+
+    def fibres(*direction):
+        """Along `direction`, beside the paper's law; they act where stretched or compressed."""
+
+        def energy(d, m):
+            stretched = d.F * ngsolve.CF(direction)
+            return paper(d, m) + m.mu * (ngsolve.InnerProduct(stretched, stretched) - 1) ** 2
+
+        return energy
+
+    paper = ngswell.NeoHookean().energy
+    energies = [
+        paper,
+        lambda d, m: 1.0001 * paper(d, m),
+        lambda d, m: paper(d, m) + m.mu * (d.I1 - 3 - 2 * ngsolve.log(d.J)) ** 2,  # the same moduli at F = I
+        lambda d, m: paper(d, m) + m.mu * (d.J - 1) ** 4,
+        *(fibres(*direction) for direction in [(1, 0, 0), (0, 1, 0), (0, 0, 1), (0.6, 0.8, 0), (0.6, 0, 0.8)]),
+    ]
+    digests = [digest(energy) for energy in energies]
+    assert len(set(digests)) == len(energies)
+    assert [digest(energy) for energy in energies] == digests
+    assert digest(lambda d, m: paper(d, m) + 1.0) == digests[0]  # a constant makes no other law
 
 
 @pytest.mark.parametrize("observers", [[], [Probe((0.4,), "J")], [Probe((0.5,), "J"), Area()], [Area()]])
 def test_other_observers_are_refused(written, observers):
-    with pytest.raises(InputError, match=r"has the observers Probe\(\(0.5,\), 'J'\), this run .*restart.snapshot"):
+    with pytest.raises(InputError, match=r"has the observers Probe\(\(0.5,\), 'J'\), this run .*read_checkpoint"):
         confined_column(cells=4).run(8.0, Fixed(1.0), observers, resume=read_checkpoint(written))
-
-
-class Forgetful(Observer):
-    def start(self, problem, begin, until):
-        self.begun, self.seen = begin, []
-
-    def observe(self, problem, report):
-        self.seen.append(report.time)
 
 
 class Remembering(Observer):
     def prepare(self, problem, begin, until):
         self.steps = []
 
-    def observe(self, problem, report):
-        self.steps.append(report.dt)
+    def observe(self, problem, step):
+        self.steps.append(step.dt)
 
-    def memory(self):
+    def state(self):
         return {"steps": np.array(self.steps)}
 
-    def remember(self, memory):
-        self.steps = memory["steps"].tolist()
+    def restore(self, state):
+        self.steps = state["steps"].tolist()
 
 
 def test_observers_of_ones_own(tmp_path):
     path, scene = tmp_path / "run", confined_column(cells=4)
-    scene.run(2.0, Fixed(1.0), [Forgetful(), Remembering(), Checkpoint(path)])
+    scene.run(2.0, Fixed(1.0), [Forgetful(), Remembering()], checkpoint=Checkpoint(path))
     forgetful, remembering = Forgetful(), Remembering()
     scene.run(4.0, Fixed(1.0), [remembering, forgetful], resume=read_checkpoint(path))
     assert (forgetful.begun, forgetful.seen) == (2.0, [3.0, 4.0])
     assert remembering.steps == [1.0] * 4
+
+
+def test_resume_beside_a_checkpoint(written, tmp_path):
+    def run(until, resume, checkpoint, *more):
+        probe = Probe((0.5,), "J")
+        return confined_column(cells=4).run(until, Fixed(1.0), [probe, *more], resume=resume, checkpoint=checkpoint), probe
+
+    restart, path = read_checkpoint(written), tmp_path / "run"
+    shorter, _ = run(2.0, None, Checkpoint(path))
+    before, source = path.read_bytes(), written.read_bytes()
+    for resume in (restart, restart.snapshot, shorter.end):
+        with pytest.raises(OutputError, match=f"{path} exists.*leave resume out.*overwrite=True"):
+            run(8.0, resume, Checkpoint(path))
+    assert path.read_bytes() == before
+
+    result, probe = run(6.0, restart, Checkpoint(path, overwrite=True))  # another file's run, with its records
+    assert (len(result.steps), probe.time.tolist()) == (6, [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0])
+    result, probe = run(7.0, read_checkpoint(path), Checkpoint(path))  # its own file may be named too
+    assert (len(result.steps), len(probe.time)) == (7, 8)
+    result, probe = run(8.0, restart, Checkpoint(tmp_path / "new"))
+    assert (len(result.steps), read_checkpoint(tmp_path / "new").snapshot.time) == (8, 8.0)
+    result, probe = run(6.0, restart.snapshot, Checkpoint(tmp_path / "anew"))  # the state alone
+    assert (len(result.steps), probe.time.tolist()) == (2, [4.0, 5.0, 6.0])
+    assert written.read_bytes() == source
+
+
+def test_trees_come_back_from_a_file_as_they_were(tmp_path):
+    path, header = tmp_path / "tree", {"format": 7, "words": ["a/b", "ä"], "nothing": None, "number": 0.1}
+    tree = {
+        "numbers": np.linspace(0, 1, 7) / 3,
+        "special": np.array([np.inf, -np.inf, np.nan, -0.0, 5e-324]),
+        "one": np.array(0.1),
+        "whole": np.array([[1, 2], [3, 4]]),
+        "flag": np.array(True),
+        "words": np.array(["p", "c_plus", ""]),
+        "no entries": np.zeros((0, 3)),
+        "empty": {},
+        "levels": {"one": {"two": {"three": np.arange(3.0)}, "empty": {}}, "empty": {"empty": {}}, "0": np.arange(2)},
+        "left|right": {"a/b": {"c/d": np.arange(4.0), "/": {}}, "a": {"b": np.arange(5.0)}, "%2F": np.arange(6), "a%": {}},
+        "%252F/": {"top bottom": np.arange(3), "ü": np.arange(1)},
+    }
+    write_tree(path, "Test", header, tree)
+    said, found = read_tree(path)
+    assert {name: said[name] for name in header} == header
+    check_equal(found, tree)
+    assert list(found) == list(tree)  # observers and steps are told by their order
+
+    write_tree(path, "Test", {}, {})
+    assert read_tree(path)[1] == {}
+    write_tree(path, "Test", {}, {"numbers": [1.5, 2.5], "number": 3.5})  # what numpy makes arrays of
+    check_equal(read_tree(path)[1], {"numbers": np.array([1.5, 2.5]), "number": np.array(3.5)})
+    assert [file.name for file in tmp_path.iterdir()] == ["tree"]
 
 
 def test_damaged_and_foreign_files(written, tmp_path):
@@ -317,7 +459,7 @@ def test_damaged_and_foreign_files(written, tmp_path):
             found += 1
         else:
             assert restart.snapshot.values.tolist() == same.snapshot.values.tolist()
-            assert (restart.snapshot.time, restart.steps, restart.parts) == (same.snapshot.time, same.steps, same.parts)
+            assert (restart.snapshot.time, restart.steps, restart.digest) == (same.snapshot.time, same.steps, same.digest)
             check_equal(restart.stepper, same.stepper)
             check_equal(restart.observers[0][1], same.observers[0][1])
     assert found > 200  # most of the file is data
@@ -327,12 +469,14 @@ def test_other_versions(written, tmp_path, monkeypatch):
     restart = read_checkpoint(written)
     with np.load(written) as archive:
         arrays = dict(archive)
-    said = json.loads(arrays["ngswell"].item())
-    arrays["ngswell"] = np.array(json.dumps({**said, "format": 2, "fields": "elsewhere"}).encode())
-    np.savez(tmp_path / "later.npz", **arrays)
-    with pytest.raises(InputError, match=r"checkpoint format 2.*reads format 1"):
-        read_checkpoint(tmp_path / "later.npz")
-    monkeypatch.setattr(ngswell, "__version__", "0.0.9")
+    said = json.loads(arrays["header"].item())
+    assert said["format"] == 2
+    for other in (1, 3):
+        arrays["header"] = np.array(json.dumps({**said, "format": other, "fields": "elsewhere"}).encode())
+        np.savez(tmp_path / "other.npz", **arrays)
+        with pytest.raises(InputError, match=rf"checkpoint format {other}.*reads 2; go on with the version that wrote it"):
+            read_checkpoint(tmp_path / "other.npz")
+    monkeypatch.setattr("ngswell.run.restart.__version__", "0.0.9")
     with pytest.raises(InputError, match=rf"written by {restart.versions}.*this is ngswell 0.0.9"):
         confined_column(cells=4).run(8.0, Fixed(1.0), [Probe((0.5,), "J")], resume=restart)
 
@@ -341,22 +485,27 @@ def test_what_cannot_be_written_is_refused_before_computing(tmp_path, monkeypatc
     (tmp_path / "file").write_text("not a folder")
     scene = confined_column(cells=4)
     advanced = []
-    monkeypatch.setattr("ngswell.scene.Stepper", lambda *a: advanced.append(a))
+    monkeypatch.setattr("ngswell.run.run.Stepper", lambda *a: advanced.append(a))
     for path, words in (
         (tmp_path / "none" / "run", "no folder"),
         (tmp_path / "file" / "run", "no folder"),
-        (tmp_path / "file", "exists.*overwrite=True"),
-        (tmp_path, "exists"),
+        (tmp_path, "is a folder"),
     ):
         with pytest.raises(OutputError, match=words):
-            scene.run(4.0, Fixed(1.0), [Checkpoint(path)])
+            scene.run(4.0, Fixed(1.0), checkpoint=Checkpoint(path))
+    with pytest.raises(InputError, match=r"no checkpoint.*overwrite=True"):
+        scene.run(4.0, Fixed(1.0), checkpoint=Checkpoint(tmp_path / "file"))
     with pytest.raises(OutputError, match="is a folder"):
-        scene.run(4.0, Fixed(1.0), [Checkpoint(tmp_path, overwrite=True)])
+        scene.run(4.0, Fixed(1.0), checkpoint=Checkpoint(tmp_path, overwrite=True))
     monkeypatch.setattr("os.access", lambda *a: False)
     with pytest.raises(OutputError, match="cannot be written to"):
-        scene.run(4.0, Fixed(1.0), [Checkpoint(tmp_path / "run")])
+        scene.run(4.0, Fixed(1.0), checkpoint=Checkpoint(tmp_path / "run"))
     with pytest.raises(InputError, match="every"):
         Checkpoint(tmp_path / "run", every=-1.0)
+    with pytest.raises(InputError, match="checkpoint"):
+        scene.run(4.0, Fixed(1.0), checkpoint=tmp_path / "run")
+    with pytest.raises(InputError, match=r"observers.*Checkpoint"):
+        scene.run(4.0, Fixed(1.0), [Checkpoint(tmp_path / "run")])  # where it stood before
     assert not advanced
     assert (tmp_path / "file").read_text() == "not a folder"
 
@@ -366,21 +515,22 @@ def test_a_failed_write_stops_the_run_and_leaves_the_file_before(tmp_path, monke
     kept = []
 
     class Fill(Observer):
-        def observe(self, problem, report):
-            if report.time == 3.0:
-                kept.append(path.read_bytes())
+        def observe(self, problem, step):
+            if step.time == 3.0:
+                kept.extend([path.read_bytes(), problem])
                 monkeypatch.setattr("os.fsync", full)
 
     def full(file):
         raise OSError(28, "No space left on device")
 
     with pytest.raises(OutputError, match=f"{path}.*No space left on device.*unchanged.*Free space"):
-        scene.run(9.0, Fixed(1.0), [probe, Fill(), Checkpoint(path, every=0.0)])
+        scene.run(9.0, Fixed(1.0), [probe, Fill()], checkpoint=Checkpoint(path, every=0.0))
     assert [file.name for file in tmp_path.iterdir()] == ["run"]
-    assert path.read_bytes() == kept[0]
+    before, problem = kept
+    assert path.read_bytes() == before
     assert read_checkpoint(path).snapshot.time == 2.0
-    assert scene.problem.time == 3.0  # the last accepted state
-    assert probe.values["J"][-1] == scene.problem.state.J(scene.mesh(0.5))
+    assert problem.time == 3.0  # the last accepted state
+    assert probe.values["J"][-1] == problem.state.J(scene.mesh(0.5))
 
 
 def test_a_vtk_piece_that_is_cut_short_is_noticed(tmp_path, monkeypatch):
@@ -403,10 +553,10 @@ def test_a_vtk_piece_that_is_cut_short_is_noticed(tmp_path, monkeypatch):
 
 def test_when_it_is_written(tmp_path):
     class Times(Observer):
-        def observe(self, problem, report):
+        def observe(self, problem, step):
             if not written or written[-1] != read_checkpoint(path).snapshot.time:
                 written.append(read_checkpoint(path).snapshot.time)
-            if report.time == 6.0:
+            if step.time == 6.0:
                 checkpoint.request()
 
     for checkpoint, times in (
@@ -415,9 +565,9 @@ def test_when_it_is_written(tmp_path):
         (Checkpoint(tmp_path / "at", when=[2.5, 4.0]), [0.0, 2.5, 4.0]),
     ):
         path, written = checkpoint.path, []
-        confined_column(cells=4).run(10.0, Fixed(1.0), [Times(), checkpoint])
+        confined_column(cells=4).run(10.0, Fixed(1.0), [Times()], checkpoint=checkpoint)
         assert [time for time in written if time < 6.0] == [time for time in times if time < 6.0]
-        assert (6.0 in written) or checkpoint.when  # asked for after the step to 6 s
+        assert (6.0 in written) or times == [0.0, 2.5, 4.0]  # asked for after the step to 6 s
         assert read_checkpoint(path).snapshot.time == 10.0
 
 
@@ -430,9 +580,10 @@ def test_a_run_that_fails_leaves_its_last_accepted_state(tmp_path):
 
     checkpoint, probe = Checkpoint(tmp_path / "run", every=3600.0), Probe((0.5,), "J")
     with pytest.raises(StepError) as failed:
-        run(observers=[probe, checkpoint])
+        run(observers=[probe], checkpoint=checkpoint)
     restart = read_checkpoint(checkpoint.path)
-    assert restart.snapshot.time == failed.value.time == probe.time[-1]
+    assert restart.snapshot.time == failed.value.end.time == failed.value.time == probe.time[-1]
+    assert restart.snapshot.values.tolist() == failed.value.end.values.tolist()
     with pytest.raises(StepError) as again:
         run(observers=[Probe((0.5,), "J")], resume=restart)
     assert again.value.time == failed.value.time
@@ -449,8 +600,8 @@ def test_a_finished_run_is_over_and_a_later_end_goes_on(written, tmp_path):
     path.write_bytes(written.read_bytes())
 
     def run(until):
-        checkpoint, probe = Checkpoint(path), Probe((0.5,), "J")
-        return confined_column(cells=4).run(until, Fixed(1.0), [checkpoint, probe], resume=checkpoint.read()), probe
+        probe = Probe((0.5,), "J")
+        return confined_column(cells=4).run(until, Fixed(1.0), [probe], checkpoint=Checkpoint(path)), probe
 
     stamp = path.stat().st_mtime_ns
     result, probe = run(4.0)

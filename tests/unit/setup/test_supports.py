@@ -5,14 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from ngswell import (
-    InputError,
-    Pin,
-    Roller,
-    Symmetry,
-    Traction,
-    Weight,
-)
+from ngswell import InputError, Pin, Roller, Symmetry, Traction, Weight
 from tests.scenes import confined_column, strip
 
 
@@ -41,4 +34,4 @@ def test_symmetry_needs_a_straight_boundary():
 def test_a_generator_of_supports_is_kept():
     # It used to be empty after the first look, so that the body seemed free.
     scene = confined_column(cells=2, supports=(support for support in [Roller("bottom", "x")]))
-    assert scene.held() == {"x": "bottom"}
+    assert scene.fixed() == {"x": "bottom"}

@@ -15,7 +15,7 @@ from ngswell import (
     Potential,
     Ramp,
     Scene,
-    Solid,
+    Spatial,
     Symmetry,
     box,
     rectangle,
@@ -49,7 +49,7 @@ def test_refactorisation_follows_the_matrix(name):
         (rectangle(1.0, 1.0, 3, 3), PlaneStrain(), Potential(4), Essential()),
         (rectangle(1.0, 1.0, 3, 3), PlaneStrain(), Concentration(3), Penalty(relative=1e3)),
         (rectangle(1.0, 1.0, 3, 3, triangles=True), PlaneStrain(), Concentration(4), Frozen()),
-        (box(1.0, 1.0, 1.0, 2, 2, 2), Solid(), Potential(3), Essential()),
+        (box(1.0, 1.0, 1.0, 2, 2, 2), Spatial(), Potential(3), Essential()),
     ],
     ids=lambda value: str(value) if isinstance(value, (Concentration, Potential)) else None,
 )

@@ -6,10 +6,10 @@ import pytest
 
 from ngswell import (
     Bath,
+    DampedNewton,
     Fixed,
     InputError,
     Material,
-    Newton,
     Penalty,
     PlaneStrain,
     Ramp,
@@ -23,8 +23,8 @@ from ngswell import (
 @pytest.mark.parametrize(
     ("make", "words"),
     [
-        (lambda: Newton(math.nan), "tolerance = nan"),
-        (lambda: Newton(most_iterations=0), "most_iterations 0"),
+        (lambda: DampedNewton(math.nan), "tolerance = nan"),
+        (lambda: DampedNewton(most_iterations=0), "most_iterations 0"),
     ],
 )
 def test_refused(make, words):

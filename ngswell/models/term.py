@@ -1,0 +1,46 @@
+"""A residual as named terms."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+from ngsolve import CoefficientFunction
+
+
+class Kind(Enum):
+    """How a term enters the residual."""
+
+    RATE = "a content whose time derivative enters"
+    ENERGY = "a density whose variation enters"
+    FORM = "an integrand linear in the test functions"
+
+
+class Role(Enum):
+    """What a term does in its balance. Ledgers and the like go by it, never by a name."""
+
+    INNER = "acts within the body"
+    EFFLUX = "takes what leaves through a boundary out of the balance"
+    ADJOINT = "keeps the form consistent or symmetric; it takes nothing out"
+    CONDITION = "a condition of its own, tested beside the balances"
+    LOAD = "a force from outside"
+
+
+@dataclass(frozen=True)
+class Term:
+    """One named term of one balance; `name` is for display.
+
+    Integrated over `boundary` if that is named, else over the body. On a boundary, fields have tangential derivatives only,
+    unless the term asks for `normal_derivatives`.
+    """
+
+    balance: str
+    name: str
+    integrand: CoefficientFunction
+    kind: Kind = Kind.FORM
+    role: Role = Role.INNER
+    boundary: str | None = None
+    normal_derivatives: bool = False
+
+    def __str__(self) -> str:
+        return f"{self.balance}: {self.name}" + (f" [{self.boundary}]" if self.boundary else "")

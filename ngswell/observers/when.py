@@ -1,0 +1,54 @@
+"""The times at which something is due during a run."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import isclose
+
+import numpy as np
+
+from ngswell import checks
+from ngswell.errors import InputError
+from ngswell.schedules import LARGEST
+
+MOST_RECORDS = 10**6
+"""Records that an interval may ask for."""
+
+
+class When:
+    """After every accepted step (None), at an interval [s], or at a list of times [s]. `what` is whose times they are."""
+
+    def __init__(self, what: str, value: float | Sequence[float] | None) -> None:
+        if checks.is_number(value):
+            value = checks.positive(f"{what}: the interval", value, "s")
+        elif value is not None:
+            value = checks.vector(f"{what}: the times", value, LARGEST, "s")
+            if not value:
+                raise InputError(f"{what}: there are no times to record at; leave `when` out to record every step")
+        self.what, self.value = what, value
+        self._times: list[float] = []
+
+    def plan(self, begin: float, until: float) -> list[float]:
+        """Settle the times of a run from `begin` to `until` [s]; returns them, for steps to land on."""
+        if self.value is None:
+            self._times = []
+        elif isinstance(self.value, float):
+            if (until - begin) / self.value > MOST_RECORDS:
+                raise InputError(
+                    f"{self.what}: an interval of {self.value:g} s makes more than {MOST_RECORDS} records from "
+                    f"{begin:g} to {until:g} s; take a longer one"
+                )
+            self._times = [*np.arange(begin, until, self.value).tolist(), until]
+        else:
+            for time in self.value:
+                if not begin <= time <= until:
+                    raise InputError(f"{self.what}: {time:g} s is outside the run, {begin:g} to {until:g} s")
+            self._times = list(self.value)
+        return self._times
+
+    def due(self, time: float) -> bool:
+        """Whether `time` [s] is one of them; every time is where none are named."""
+        return self.value is None or any(isclose(time, t, rel_tol=1e-12, abs_tol=1e-12) for t in self._times)
+
+    def __repr__(self) -> str:
+        return "" if self.value is None else f"when={np.array(self.value).tolist()}"

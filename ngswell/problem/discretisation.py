@@ -1,0 +1,114 @@
+"""A setup on its mesh: the space, its unknowns and their sizes, and states from their coefficients."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from ngsolve import CF, H1, VOL, BitArray, Compress, FESpace, GridFunction
+from numpy.typing import NDArray
+
+from ngswell.errors import InputError
+from ngswell.mesh.points import points, vertices
+from ngswell.models.model import BathFields, FieldContext
+from ngswell.setup.setup import Setup
+
+BONUS_ORDER = 2
+"""Extra integration order: the pulled-back terms are rational in F."""
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """The fields at one time: what a run can go on from. `values` are all coefficients, in the order of the space."""
+
+    time: float
+    values: NDArray
+
+
+class Discretisation:
+    """The unknowns of a setup. No field: two states of one setup have the same discretisation."""
+
+    def __init__(self, setup: Setup) -> None:
+        self.setup = setup
+        self.mesh, self.model, self.kinematics = setup.mesh, setup.model, setup.kinematics
+        prescribed = "|".join(bath.boundary for bath, _ in setup.prescribed_baths)
+        self.space: FESpace = self.model.space(self.mesh, self.kinematics, setup.fixed(), prescribed)
+        self.names: tuple[str, ...] = self.model.unknowns
+        with_multipliers = "|".join(bath.boundary for bath, treatment in setup.weak_baths if treatment.multipliers)
+        if with_multipliers:
+            traces = Compress(H1(self.mesh, order=self.model.order - 1, definedon=self.mesh.Boundaries(with_multipliers)))
+            self.space = FESpace([*self.space.components, *(traces for _ in self.model.balanced)])
+            self.names += tuple(f"efflux of {balance}" for balance in self.model.balanced)
+        spans = [self.space.Range(i) for i in range(len(self.names))]
+        self.ranges = {name: slice(span.start, span.stop) for name, span in zip(self.names, spans, strict=True)}
+        self.free = self._free_dofs()
+
+    def _free_dofs(self) -> BitArray:
+        free = BitArray(self.space.FreeDofs())
+        directions = self.kinematics.directions
+        per_component = self.space.components[0].ndof // len(directions)
+        for vertex, direction in self.setup.pins():
+            free.Clear(directions.index(direction) * per_component + vertex)
+        return free
+
+    @cached_property
+    def points(self) -> NDArray:
+        """The integration points of the forms over the body."""
+        return points(self.mesh, VOL, 2 * self.model.order + BONUS_ORDER)
+
+    @cached_property
+    def references(self) -> dict[str, float]:
+        """A size of each unknown that the setup itself sets, so that tolerances need no units."""
+        setup = self.setup
+        corners = vertices(self.mesh)
+        length = float(np.linalg.norm(corners.max(axis=0) - corners.min(axis=0)))
+        charge = setup.material.largest("cfc0", self.mesh) * max(map(abs, setup.charge.values))
+        salts = [value for bath in setup.baths if bath.salt for value in bath.salt.values]
+        own = self.model.references(max([charge, *salts]), setup.material.largest("mu", self.mesh), length)
+        multipliers = self.names[len(own) :]  # in the units of p and c
+        return own | {name: own[unknown] for name, unknown in zip(multipliers, self.model.balanced.values(), strict=False)}
+
+    @cached_property
+    def sizes(self) -> NDArray:
+        """The reference size of every coefficient."""
+        sizes = np.empty(self.space.ndof)
+        for name, reference in self.references.items():
+            sizes[self.ranges[name]] = reference
+        return sizes
+
+    def worst(self, vector: NDArray) -> tuple[str, tuple[float, ...]]:
+        """The unknown with the largest entry of `vector` in units of its reference, and the vertex [mm] where it is."""
+        name = max(self.model.unknowns, key=lambda n: _largest(vector[self.ranges[n]]) / self.references[n])
+        at_vertices = np.abs(self.vertex_values(vector, name)).max(axis=0)
+        vertex = int(np.argmax(np.where(np.isfinite(at_vertices), at_vertices, np.inf)))
+        return name, tuple(map(float, self.mesh.vertices[vertex].point))
+
+    def vertex_values(self, vector: NDArray, name: str) -> NDArray:
+        """Coefficients of an unknown at the vertices, one row a component."""
+        components = self.kinematics.dimension if name == self.model.unknowns[0] else 1
+        return vector[self.ranges[name]].reshape(components, -1)[:, : self.mesh.nv]
+
+    def check(self, what: str, snapshot: Snapshot) -> None:
+        """Refuse a snapshot of another discretisation."""
+        if snapshot.values.shape != (self.space.ndof,):
+            raise InputError(f"{what}: the snapshot has {snapshot.values.size} unknowns, the scene {self.space.ndof}")
+
+    def state_at(self, snapshot: Snapshot) -> Any:
+        """The model's state at a snapshot, on fields of its own: what a later run does leaves it as it is."""
+        self.check("state", snapshot)
+        fields = GridFunction(self.space)
+        fields.vec.FV().NumPy()[:] = snapshot.values
+        setup, time = self.setup, snapshot.time
+        bath = None
+        if setup.baths:
+            first = setup.baths[0]
+            bath = BathFields(None if first.salt is None else CF(first.salt.at(time)), CF(first.hydraulic.at(time)))
+        context = FieldContext(setup.material, self.kinematics, setup.charge.at(time), setup.fluid_weight, bath)
+        return self.model.state(fields.components[: len(self.model.unknowns)], context)
+
+
+def _largest(values: NDArray) -> float:
+    largest = float(np.abs(values).max())
+    return largest if np.isfinite(largest) else np.inf

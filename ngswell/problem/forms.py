@@ -1,0 +1,39 @@
+"""Terms as integrals for NGSolve's forms."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ngsolve import CF, VOL, BilinearForm, Integrate, Mesh, Variation, ds, dx
+
+from ngswell.models.term import Kind, Term
+from ngswell.problem.discretisation import BONUS_ORDER, Discretisation
+
+
+def integral(discretisation: Discretisation, term: Term, factor: Any = None) -> Any:
+    """A term over its part of the body or of its boundary, for a BilinearForm."""
+    weight = discretisation.kinematics.weight
+    integrand = ((weight if factor is None else factor * weight) * term.integrand).Compile()
+    if term.boundary is not None:
+        region = discretisation.mesh.Boundaries(term.boundary)
+        return integrand * ds(definedon=region, bonus_intorder=BONUS_ORDER, skeleton=term.normal_derivatives)
+    over_body = integrand * dx(bonus_intorder=BONUS_ORDER)
+    return Variation(over_body) if term.kind is Kind.ENERGY else over_body
+
+
+def form(discretisation: Discretisation, terms: list[Term], rates: Any = None, condense: bool = False) -> BilinearForm:
+    """The sum of terms; those of kind RATE with the factor `rates`, such as 1/Δt."""
+    result = BilinearForm(discretisation.space, condense=condense)
+    for term in terms:
+        result += integral(discretisation, term, rates if term.kind is Kind.RATE else None)
+    return result
+
+
+def cell_size(mesh: Mesh, boundary: str) -> float:
+    """Volume of the cells at a boundary over its area: their size normal to it [mm]."""
+    region = mesh.Boundaries(boundary)
+    nodes = {1: "vertices", 2: "edges", 3: "faces"}[mesh.dim]
+    faces = {getattr(element, nodes)[0].nr for element in region.Elements()}
+    cells = {cell.nr for cell in mesh.Elements(VOL) if any(face.nr in faces for face in cell.facets)}
+    volumes = Integrate(CF(1.0), mesh, VOL, element_wise=True).NumPy()
+    return float(volumes[sorted(cells)].sum() / Integrate(CF(1.0), mesh, definedon=region))

@@ -1,0 +1,59 @@
+"""The observers of one run."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from types import TracebackType
+from typing import Any
+
+from ngswell import checks
+from ngswell.files import Tree
+from ngswell.observers.base import Observer
+from ngswell.observers.call import Call
+from ngswell.problem.problem import Problem
+from ngswell.stepping.steps import Step
+
+
+class Watch:
+    """Starts observers, shows them accepted steps, and finishes those that were started, however a run ends."""
+
+    def __init__(self, observers: Sequence[Observer | Callable[[float, Any], object]]) -> None:
+        given = checks.several("observers", observers, (Observer, Callable), "observers, such as Probe(...), or functions")
+        self.observers = [each if isinstance(each, Observer) else Call(each) for each in given]
+        self._started: list[Observer] = []
+        self._problem: Problem | None = None
+
+    def plan(self, begin: float, until: float) -> list[float]:
+        """Times on which steps have to land [s]."""
+        return [time for observer in self.observers for time in observer.plan(begin, until)]
+
+    def start(
+        self, problem: Problem, begin: float, time: float, until: float, remembered: Sequence[tuple[str, Tree]] = ()
+    ) -> None:
+        """From the present fields at `time`; what was `remembered` of an earlier part goes back to those it came from."""
+        self._problem = problem
+        states = iter(remembered)
+        for observer in self.observers:
+            if remembered and observer.remembers:
+                observer.resume(problem, begin, until, next(states)[1])
+            else:
+                observer.start(problem, time, until)
+            self._started.append(observer)
+
+    def observe(self, step: Step) -> None:
+        """Show every observer an accepted step."""
+        assert self._problem is not None
+        for observer in self.observers:
+            observer.observe(self._problem, step)
+
+    def state(self) -> tuple[tuple[str, Tree], ...]:
+        """What observers that take part in checkpoints remember, by their settings."""
+        return tuple((repr(o), {**o.state(), "time": o.time}) for o in self.observers if o.remembers)
+
+    def __enter__(self) -> Watch:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        assert self._problem is not None or not self._started
+        for observer in self._started:
+            observer.finish(self._problem)  # type: ignore[arg-type]

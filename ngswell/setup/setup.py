@@ -1,0 +1,175 @@
+"""A setup: mesh, motion, material, model, supports, baths and loads, checked. It knows nothing of fields and clocks."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from ngsolve import CoefficientFunction, Mesh
+
+from ngswell import checks
+from ngswell.baths.bath import Bath, checked_salt, default_treatment
+from ngswell.baths.treatment import Prescribed, Treatment, Weak
+from ngswell.errors import InputError
+from ngswell.mesh.points import vertices_of
+from ngswell.mesh.shapes import check_mesh
+from ngswell.models.model import Model
+from ngswell.models.potential import Potential
+from ngswell.physics.kinematics import Kinematics
+from ngswell.physics.material import Material
+from ngswell.schedules import LARGEST, Ramp, Schedule
+from ngswell.setup.loads import Load
+from ngswell.setup.rigid_motions import check_determined
+from ngswell.setup.supports import Support
+
+
+@dataclass(frozen=True, kw_only=True)
+class Setup:
+    """An initial boundary-value problem of a swelling body. Units mm, N, s, K, mol/l throughout.
+
+    The body starts undeformed, in Donnan equilibrium with `initial` (salt concentration [mol/l] and hydraulic
+    pressure [N/mm²]; by default that of its baths at `start`, which then have to agree). `charge` multiplies the
+    material's cfc0 over time. Raises InputError for anything that cannot be meant.
+    """
+
+    mesh: Mesh
+    kinematics: Kinematics
+    material: Material
+    model: Model = Potential()
+    supports: Sequence[Support] = ()
+    baths: Sequence[Bath] = ()
+    loads: Sequence[Load] = ()
+    charge: Ramp = Ramp((0.0, 1.0))
+    start: float = 0.0  # [s]
+    initial: tuple[float | None, float] | None = None
+
+    def __post_init__(self) -> None:
+        self._check_kinds()
+        if self.kinematics.dimension != self.mesh.dim:
+            raise InputError(
+                f"{type(self.kinematics).__name__} needs a {self.kinematics.dimension}-d mesh, this one is {self.mesh.dim}-d"
+            )
+        check_mesh(self.mesh)
+        self.material.check_on(self.mesh)
+        self.model.check(self.material, self.baths)
+        for value in self.charge.values:
+            if not 0 <= value <= 100:
+                raise InputError(f"charge factor {value!r} is outside 0 … 100; it multiplies cfc0")
+        self._check_baths()
+        for support in self.supports:
+            support.check_in(self)
+        self.kinematics.check(self.mesh, self.fixed())
+        wet = {number for bath in self.baths for number in vertices_of(self.mesh, bath.boundary)}
+        check_determined(self.mesh, self.kinematics, self.fixed(), self.pins(), wet)
+        for load in self.loads:
+            load.check_in(self)
+        self.initial_bath()  # refuses baths that differ at the start
+
+    # -- checks --------------------------------------------------------------------------------------------------------
+
+    def _check_kinds(self) -> None:
+        """Refuse pieces that are none of their kind; lists become tuples."""
+        checks.instance("mesh", self.mesh, Mesh, "a mesh of NGSolve, as column, rectangle, box, from_occ and read_mesh make")
+        motions = "Confined(), PlaneStrain(), Axisymmetric() or Spatial()"
+        checks.instance("kinematics", self.kinematics, Kinematics, motions)
+        checks.instance("material", self.material, Material, "a Material(...)")
+        models = "Potential(), Concentration(), LocalDonnan() or Uncharged()"
+        checks.instance("model", self.model, Model, models)
+        checks.instance("charge", self.charge, Ramp, "a Ramp of factors on cfc0, such as Ramp((0, 0.0), (4000, 1.0))")
+        checks.set_fields(
+            self,
+            supports=checks.several("supports", self.supports, Support, "Roller, Symmetry or Pin"),
+            baths=checks.several("baths", self.baths, Bath, "Bath(...)"),
+            loads=checks.several("loads", self.loads, Load, "Traction or Weight"),
+            start=checks.number("start", self.start, "s", -LARGEST, LARGEST),
+        )
+        if self.initial is not None:
+            initial = checks.as_tuple(self.initial)
+            if initial is None or len(initial) != 2:
+                pair = "(concentration [mol/l], hydraulic pressure [N/mm²])"
+                raise InputError(f"initial has to be {pair}, got {checks.short(self.initial)}")
+            salt, hydraulic = initial
+            if salt is not None:
+                salt = checked_salt("initial: concentration", salt)
+            checks.set_fields(
+                self, initial=(salt, checks.number("initial: hydraulic pressure", hydraulic, "N/mm²", -1e3, 1e3))
+            )
+
+    def check_boundary(self, what: str, boundary: str) -> list[str]:
+        """The names in `boundary` ("a|b"); InputError for one that the mesh does not have."""
+        known = sorted(set(self.mesh.GetBoundaries()))
+        names = boundary.split("|")
+        for name in names:
+            if name not in known:
+                raise InputError(f"{what}: the mesh has no boundary {name!r}; it has {', '.join(known)}")
+            if re.escape(name) != name:
+                raise InputError(f"{what}: boundary {name!r} has characters that NGSolve reads as a pattern; rename it")
+        return names
+
+    def _check_baths(self) -> None:
+        taken: set[str] = set()
+        for bath in self.baths:
+            for name in self.check_boundary("bath", bath.boundary):
+                if name in taken:
+                    raise InputError(f"bath on {bath.boundary!r}: boundary {name!r} already has a bath")
+                taken.add(name)
+            bath.check_in(self)
+
+    # -- what models, pieces and problems ask --------------------------------------------------------------------------
+
+    def fixed(self) -> dict[str, str]:
+        """Boundaries ("a|b") on which each displacement component vanishes."""
+        boundaries: dict[str, list[str]] = {direction: [] for direction in self.kinematics.directions}
+        for support in self.supports:
+            for direction, boundary in support.fixed(self).items():
+                boundaries[direction].append(boundary)
+        return {direction: "|".join(names) for direction, names in boundaries.items()}
+
+    def pins(self) -> list[tuple[int, str]]:
+        """Vertices at which a displacement component vanishes, with its direction."""
+        return [pin for support in self.supports for pin in support.pins(self)]
+
+    def treatment(self, bath: Bath) -> Treatment:
+        """How equilibrium with `bath` is imposed: as it says, or by the model's default."""
+        return default_treatment(self.model) if bath.treatment is None else bath.treatment
+
+    @property
+    def weak_baths(self) -> list[tuple[Bath, Weak]]:
+        """Baths whose treatment adds terms to the balances."""
+        treated = ((bath, self.treatment(bath)) for bath in self.baths)
+        return [(bath, treatment) for bath, treatment in treated if isinstance(treatment, Weak)]
+
+    @property
+    def prescribed_baths(self) -> list[tuple[Bath, Prescribed]]:
+        """Baths whose treatment prescribes values."""
+        treated = ((bath, self.treatment(bath)) for bath in self.baths)
+        return [(bath, treatment) for bath, treatment in treated if isinstance(treatment, Prescribed)]
+
+    @property
+    def fluid_weight(self) -> tuple[float, ...] | None:
+        """Specific weight of the fluid, which drives seepage [N/mm³]; None without."""
+        return next((load.fluid_weight for load in self.loads if load.fluid_weight is not None), None)
+
+    @property
+    def schedules(self) -> list[Schedule]:
+        """All histories of the setup."""
+        of_baths = (history for bath in self.baths for history in bath.schedules)
+        return [self.charge, *of_baths, *(history for load in self.loads for history in load.schedules)]
+
+    def initial_bath(self) -> tuple[CoefficientFunction | float | None, CoefficientFunction | float]:
+        """Salt concentration [mol/l] and hydraulic pressure [N/mm²] that the initial state is in equilibrium with."""
+        if self.initial is not None:
+            if self.initial[0] is None and "cations" in self.model.balanced:
+                raise InputError(f"initial: {type(self.model).__name__} needs a salt concentration [mol/l], got None")
+            return self.initial
+        if not self.baths:
+            raise InputError("the scene has no bath: give initial=(concentration, hydraulic pressure)")
+        first = self.baths[0]
+        for bath in self.baths[1:]:
+            if [s.at(self.start) for s in bath.schedules] != [s.at(self.start) for s in first.schedules]:
+                raise InputError(
+                    f"baths on {first.boundary!r} and {bath.boundary!r} differ at the start: "
+                    "give initial=(concentration, hydraulic pressure)"
+                )
+        return (first.salt.at(self.start) if first.salt else None), first.hydraulic.at(self.start)

@@ -1,0 +1,163 @@
+"""Step controls: fixed and error-controlled steps; what an accepted step is."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import dataclass
+from math import inf
+from typing import NamedTuple, Protocol, runtime_checkable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ngswell import checks
+from ngswell.errors import InputError, Rejection
+from ngswell.solve.newton import DampedNewton
+from ngswell.stepping.schemes import BACKWARD_EULER, ESDIRK4, Scheme
+
+NEWTON_SHARE = 3e-3
+"""What the nonlinear solves may leave of a time error."""
+
+SLOWEST = 0.3
+"""Contraction of the Newton iteration from which on a new matrix is cheaper than more iterations with the old one."""
+
+FIRST = 0.1
+"""Measured start after a kink: this share of the interval to the next for a tolerance of one, less by the scheme's order."""
+
+
+class Stage(NamedTuple):
+    """A stage of an accepted step: its weight in the step [s], its time [s], its coefficients."""
+
+    weight: float
+    time: float
+    values: NDArray
+
+
+@dataclass(frozen=True)
+class StepReport:
+    """An accepted step: its end [s], its size [s], Newton iterations, what was rejected on the way, the estimated error."""
+
+    time: float
+    dt: float
+    iterations: int
+    rejected: tuple[Rejection, ...] = ()
+    error: float = inf
+
+
+@dataclass(frozen=True)
+class Step(StepReport):
+    """The same with its stages, for observers."""
+
+    stages: tuple[Stage, ...] = ()
+
+    def report(self) -> StepReport:
+        """Without the states of the stages."""
+        return StepReport(self.time, self.dt, self.iterations, self.rejected, self.error)
+
+
+def why(rejected: Iterable[Rejection]) -> str:
+    """The reasons of rejected steps, the most frequent first."""
+    counts = Counter(rejection.reason.text(rejection.what) for rejection in rejected)
+    return ", ".join(f"{count} × {reason}" for reason, count in counts.most_common())
+
+
+@runtime_checkable
+class Control(Protocol):
+    """Chooses the scheme, how its equations are solved, and step sizes [s]. A control of one's own gives, numbered:
+
+    1. `scheme` and `newton`;
+    2. `first` and `next`, the steps to try;
+    3. `accepts`, which estimated errors pass.
+    """
+
+    @property
+    def scheme(self) -> Scheme: ...
+
+    @property
+    def newton(self) -> DampedNewton: ...
+
+    def first(self, interval: float, last: float | None) -> float:
+        """First step after a kink, when the next kink is `interval` away and `last` was the step before, if any."""
+        ...
+
+    def next(self, dt: float, error: float, power: float) -> float:
+        """Next step after one of size `dt` with the estimated `error`, which goes with this `power` of the step."""
+        ...
+
+    def accepts(self, error: float) -> bool: ...
+
+
+@dataclass(frozen=True)
+class Fixed:
+    """Steps of one size [s], shortened to land on kinks and where Newton's method fails."""
+
+    step: float
+    scheme: Scheme = BACKWARD_EULER
+
+    def __post_init__(self) -> None:
+        checks.set_fields(self, step=checks.positive("Fixed step", self.step, "s"))
+        check_scheme("Fixed", self.scheme)
+
+    @property
+    def newton(self) -> DampedNewton:
+        return DampedNewton()
+
+    def first(self, interval: float, last: float | None) -> float:
+        return self.step
+
+    def next(self, dt: float, error: float, power: float) -> float:
+        return self.step
+
+    def accepts(self, error: float) -> bool:
+        return True
+
+
+@dataclass(frozen=True)
+class Adaptive:
+    """Steps whose estimated local error stays below `tolerance`.
+
+    The error is that of the embedded solution; for backward Euler, the difference to the linear extrapolation, scaled. Root
+    mean square per field, relative to the largest change that the field has undergone so far (or a small fraction of its
+    natural size).
+    """
+
+    tolerance: float = 1e-3
+    largest: float = inf  # [s]
+    scheme: Scheme = ESDIRK4
+
+    def __post_init__(self) -> None:
+        tolerance = checks.positive("Adaptive tolerance", self.tolerance)
+        if tolerance > 1:
+            raise InputError(f"Adaptive tolerance = {tolerance:g} is above 1: errors are relative to the changes, take 1e-3")
+        checks.set_fields(self, tolerance=tolerance)
+        if not (checks.is_number(self.largest) and self.largest == inf):
+            checks.set_fields(self, largest=checks.positive("Adaptive largest", self.largest, "s"))
+        check_scheme("Adaptive", self.scheme)
+
+    @property
+    def newton(self) -> DampedNewton:
+        """Nonlinear solves that add a small part of the tolerance, with few new matrices."""
+        if self.scheme.embedded is None:
+            return DampedNewton()
+        return DampedNewton(tolerance=NEWTON_SHARE * self.tolerance, slowest=SLOWEST)
+
+    def first(self, interval: float, last: float | None) -> float:
+        share = 1 / 100 if self.scheme.embedded is None else FIRST * self.tolerance ** (1 / self.scheme.order)
+        start = share * interval
+        return min(self.largest, start if last is None else min(last, 4 * start))
+
+    def next(self, dt: float, error: float, power: float) -> float:
+        safety = 0.8 if self.scheme.embedded else 0.9
+        factor = safety * (self.tolerance / error) ** (1 / power) if error > 0 else inf
+        if 1 <= factor < 1.2 and self.scheme.embedded:
+            factor = 1.0  # keeps the matrix
+        return float(min(self.largest, dt * np.clip(factor, 0.2, 3.0)))
+
+    def accepts(self, error: float) -> bool:
+        return error <= self.tolerance
+
+
+def check_scheme(what: str, scheme: object) -> None:
+    """Refuse what is no scheme."""
+    checks.instance(f"{what}: scheme", scheme, Scheme, "BACKWARD_EULER or ESDIRK4")

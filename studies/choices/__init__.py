@@ -1,0 +1,1 @@
+"""Which treatment of a bath, which model, which accuracy, which solver."""

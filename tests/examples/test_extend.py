@@ -1,0 +1,221 @@
+"""What docs/extend.md shows: pieces of one's own, each in a file below 25 lines, against its closed form."""
+
+from dataclasses import replace
+from math import log, sqrt
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from examples.extend_bath import Film
+from examples.extend_function import history, note_the_middle
+from examples.extend_load import FollowerPressure
+from examples.extend_observer import LargestStress
+from examples.extend_solid import LogNeoHookean
+from ngswell import (
+    TABLE_1,
+    TABLE_2,
+    Adaptive,
+    Axisymmetric,
+    Bath,
+    Checkpoint,
+    Concentration,
+    Confined,
+    Fixed,
+    InputError,
+    Penalty,
+    PlaneStrain,
+    Potential,
+    Ramp,
+    Roller,
+    Scene,
+    Spatial,
+    Stability,
+    Symmetry,
+    box,
+    column,
+    rectangle,
+)
+from ngswell.closed_forms.homogeneous import homogeneous_equilibrium
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+
+MOTIONS = {
+    "confined": (Confined(), lambda: column(1.0, 3), [Roller("bottom", "x")], "top", 1),
+    "plane strain": (PlaneStrain(), lambda: rectangle(1, 1, 2, 2), [Symmetry("left"), Symmetry("bottom")], "top|right", 2),
+    "axisymmetric": (
+        Axisymmetric(),
+        lambda: rectangle(1, 1, 2, 2),
+        [Roller("left", "r"), Roller("bottom", "z")],
+        "top|right",
+        3,
+    ),
+    "3-d": (
+        Spatial(),
+        lambda: box(1, 1, 1, 1, 1, 1),
+        [Symmetry("left"), Symmetry("front"), Symmetry("bottom")],
+        "right|back|top",
+        3,
+    ),
+}  # fmt: skip
+CHARGED = Ramp((0, 0.0), (4000, 1.0))  # no faster than salt diffuses in
+CLOSED = {"confined": "confined", "plane strain": "plane strain", "axisymmetric": "3-d", "3-d": "3-d"}
+
+
+def body(motion, material=TABLE_2, salt=0.3, loads=lambda boundary: [], **changes):
+    kinematics, mesh, supports, wet, _ = MOTIONS[motion]
+    return Scene(
+        **{
+            "mesh": mesh(), "kinematics": kinematics, "material": material, "supports": supports,
+            "baths": [Bath(wet, c=salt)], "loads": loads(wet), **changes,
+        }
+    )  # fmt: skip
+
+
+def middle(scene):
+    return (0.5,) * scene.mesh.dim
+
+
+@pytest.mark.parametrize("file", sorted(EXAMPLES.glob("extend_*.py")), ids=lambda file: file.stem)
+def test_each_is_short(file):
+    assert len(file.read_text().splitlines()) < 25
+
+
+# -- load --------------------------------------------------------------------------------------------------------------
+
+PRESSURE = 0.05  # N/mm²
+
+
+@pytest.mark.parametrize("motion", MOTIONS)
+def test_a_follower_pressure_comes_to_the_closed_form(motion):
+    scene = body(motion, loads=lambda wet: [FollowerPressure(wet, Ramp((0, PRESSURE)))])
+    found = scene.state(scene.equilibrate()).at(middle(scene), "J")
+    exact = homogeneous_equilibrium(TABLE_2, 0.3, CLOSED[motion], load=PRESSURE).J
+    assert found == pytest.approx(exact, rel=1e-10)  # homogeneous: exact in the space, Newton's method to round-off
+    assert abs(homogeneous_equilibrium(TABLE_2, 0.3, CLOSED[motion]).J - exact) > 0.1  # control: without the load
+
+
+def test_a_load_follows_its_history():
+    history = Ramp((0, 0.0), (100, PRESSURE))
+    scene = body("plane strain", charge=CHARGED, loads=lambda wet: [FollowerPressure(wet, history)])
+    assert 100.0 in [step.time for step in scene.run(200.0, Adaptive(1e-2)).steps]  # steps land where the history bends
+    scene = body("plane strain", loads=lambda wet: [FollowerPressure(wet, history)])
+    rest = scene.state(scene.equilibrate(50.0)).at((0.5, 0.5), "J")
+    assert rest == pytest.approx(homogeneous_equilibrium(TABLE_2, 0.3, "plane strain", load=PRESSURE / 2).J, rel=1e-10)
+    assert "pressure on top|right" in scene.describe()
+
+
+def test_a_load_says_its_refusals():
+    with pytest.raises(InputError, match="FollowerPressure: the mesh has no boundary 'lid'"):
+        body("plane strain", loads=lambda wet: [FollowerPressure("lid", Ramp((0, 1.0)))])
+
+
+# -- solid -------------------------------------------------------------------------------------------------------------
+
+log_gel = replace(TABLE_2, solid=LogNeoHookean())
+
+
+def log_balance(free, salt=0.3, m=TABLE_2):
+    """J of µ (J^(2/d) − 1) + λ ln J = J p_D, by bisection: written out, not from the energy."""
+
+    def excess(J):
+        cfc = (1 - m.nS0) * m.cfc0 / (J - m.nS0)
+        p = 2 * m.RT * (sqrt(salt**2 + cfc**2 / 4) - salt)
+        return m.mu * (J ** (2 / free) - 1) + m.lam * log(J) - J * p
+
+    low, high = 1.0, 50.0
+    while low < (middle := (low + high) / 2) < high:
+        low, high = (middle, high) if excess(middle) < 0 else (low, middle)
+    return high
+
+
+@pytest.mark.parametrize("motion", MOTIONS)
+def test_a_solid_of_ones_own_comes_to_its_balance(motion):
+    scene, free = body(motion, log_gel), MOTIONS[motion][-1]
+    state = scene.state(scene.equilibrate())
+    J = log_balance(free)
+    assert state.at(middle(scene), "J") == pytest.approx(J, rel=1e-8)
+    assert pytest.approx(1, rel=1e-12) == homogeneous_equilibrium(log_gel, 0.3, CLOSED[motion]).J / J
+    assert abs(homogeneous_equilibrium(TABLE_2, 0.3, CLOSED[motion]).J - J) > 1e-3 * J  # control: the paper's law
+
+    # The surface is free: no stress along the free directions. Across, the motion holds: −p + (µ (1 − 1) + λ ln J)/J.
+    stress = np.array(state.at(middle(scene), "stress")).reshape(3, 3)
+    held = (TABLE_2.lam * log(J)) / J - state.at(middle(scene), "p")
+    expected = np.diag([0.0 if axis < free else held for axis in range(3)])
+    assert stress == pytest.approx(expected, abs=1e-8)  # the balance is met to 1e-8 of stresses of 0.1
+    assert "solid: LogNeoHookean()" in scene.describe()
+
+
+def test_stability_and_checkpoints_follow_the_solid(tmp_path):
+    scene = body("plane strain", log_gel, charge=CHARGED)
+    stability = Stability(when=[1600.0])
+    through = scene.run(2000.0, Fixed(200.0), [stability])
+    assert stability.rates.tolist() == [0.0]
+    scene.run(1000.0, Fixed(200.0), checkpoint=Checkpoint(tmp_path / "log"))
+    resumed = scene.run(2000.0, Fixed(200.0), checkpoint=Checkpoint(tmp_path / "log"))
+    assert len(resumed.steps) == len(through.steps)
+    assert resumed.end.values == pytest.approx(through.end.values, rel=1e-9)
+    with pytest.raises(InputError, match="of another scene: material differ"):
+        body("plane strain", charge=CHARGED).run(3000.0, Fixed(200.0), checkpoint=Checkpoint(tmp_path / "log"))
+
+
+def test_a_solid_with_stress_at_the_start_is_refused():
+    class Stressed(LogNeoHookean):
+        def energy(self, deformation, material):
+            return super().energy(deformation, material) + 0.1 * deformation.J
+
+    with pytest.raises(InputError, match=r"has a stress of 0\.1 N/mm² at F = I"):
+        body("plane strain", replace(TABLE_2, solid=Stressed()))
+    with pytest.raises(InputError, match="solid has to be a law with energy"):
+        replace(TABLE_2, solid=abs)
+
+
+# -- bath --------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("model", [Concentration(), Potential()])
+def test_a_film_is_a_penalty_to_the_last_digit(model):
+    def end(treatment):
+        scene = Scene(
+            mesh=column(0.5, 10), kinematics=Confined(), material=TABLE_1, model=model, supports=[Roller("bottom", "x")],
+            baths=[Bath("top", c=Ramp((0, 0.15), (10, 0.125)), treatment=treatment)],
+        )  # fmt: skip
+        return scene.run(50.0, Fixed(5.0)).end.values
+
+    assert (end(Film(0.7, 0.7)) == end(Penalty(0.7))).all()
+    assert not (end(Film(0.7, 0.6)) == end(Penalty(0.7))).all()
+
+
+# -- observers ---------------------------------------------------------------------------------------------------------
+
+
+def test_the_largest_stress_of_a_held_gel():
+    """A gel held sideways in plane strain: across the plane it presses with −p + τ_zz/J, in the plane it is free."""
+    scene, largest = body("plane strain"), LargestStress()
+    scene.equilibrate(observers=[largest])
+    assert largest.values == pytest.approx([0.0], abs=1e-8)  # both others are zero; the held one presses
+    state = scene.state(scene.equilibrate())
+    J, p = state.at((0.5, 0.5), "J"), state.at((0.5, 0.5), "p")
+    m = TABLE_2
+    across = m.lam * (1 - m.nS0) ** 2 * (1 / (1 - m.nS0) - 1 / (J - m.nS0)) - p
+    assert np.array(state.at((0.5, 0.5), "stress")).reshape(3, 3)[2, 2] == pytest.approx(across, rel=1e-10)
+    assert across < -0.03
+
+    run = LargestStress(when=[0.0, 400.0])
+    body("plane strain", charge=CHARGED).run(800.0, Fixed(200.0), [run])
+    assert run.time.tolist() == [0.0, 400.0]
+    assert run.values[0] == pytest.approx(0.0, abs=1e-15)  # the reference state, without charge
+    assert run.values[1] > 1e-4  # the skin swells first and pulls at the core
+
+
+def test_a_function_observes():
+    scene = Scene(
+        mesh=column(0.5, 4), kinematics=Confined(), material=TABLE_1, supports=[Roller("bottom", "x")],
+        baths=[Bath("top", c=Ramp((0, 0.15), (10, 0.125)))],
+    )  # fmt: skip
+    history.clear()
+    result = scene.run(20.0, Fixed(5.0), [note_the_middle])
+    assert [time for time, _ in history] == [0.0, 5.0, 10.0, 15.0, 20.0]
+    assert history[-1][1] == result.state.at((0.25,), "p")
+    with pytest.raises(InputError, match="got the class LargestStress"):
+        scene.run(20.0, Fixed(5.0), [LargestStress])
