@@ -446,7 +446,8 @@ def draw(scenes: Sequence[ComparedScene], rows: Sequence[Row]) -> Figure:
         axes.xaxis.set_minor_formatter(NullFormatter())
         axes.yaxis.set_minor_formatter(NullFormatter())
     for axes in grid[1]:
-        axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+        low, high = axes.get_xlim()
+        axes.xaxis.set_major_locator(LogLocator(subs=(1, 1.5, 2, 3, 5, 7) if high < 5 * low else (1, 2, 5)))
         axes.xaxis.set_major_formatter(ScalarFormatter())
     for axes in grid[:, 0]:
         axes.set_ylabel("largest relative error [-]")
