@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable
 from math import inf, isfinite
+from pathlib import Path
 from typing import Any, TypeAlias, TypeGuard, TypeVar
 
 import numpy as np
@@ -110,6 +112,13 @@ def name(what: str, value: object, example: str) -> None:
     """Refuse what is no string or an empty one."""
     if not (isinstance(value, str) and value):
         raise InputError(f"{what} has to be a name, such as {example!r}, got {short(value)}")
+
+
+def path(what: str, value: object, example: str) -> Path:
+    """`value` as a path; refuse what is none, or has no last part."""
+    if not isinstance(value, (str, os.PathLike)) or not Path(value).name:
+        raise InputError(f"{what}: path has to be a file's, such as {example!r}, got {short(value)}")
+    return Path(value)
 
 
 def choice(what: str, value: object, choices: Iterable[str]) -> None:

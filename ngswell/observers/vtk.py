@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from glob import escape
 from pathlib import Path
@@ -35,14 +34,13 @@ class VTK(Observer):
         subdivision: int = 1,
         overwrite: bool = False,
     ) -> None:
+        self.path = checks.path("VTK", path, "out/swelling")
         super().__init__(when, str(path), *quantities)
-        if not isinstance(path, (str, os.PathLike)) or not Path(path).name:
-            raise InputError(f"VTK: path has to name the series, such as 'out/swelling', got {checks.short(path)}")
         for quantity in quantities:
             checks.name("VTK: a quantity", quantity, "displacement")
         subdivision = checks.integer("VTK: subdivision", subdivision, 0, 5)
         checks.flag("VTK: overwrite", overwrite)
-        self.path, self.quantities, self.subdivision, self.overwrite = Path(path), quantities, subdivision, overwrite
+        self.quantities, self.subdivision, self.overwrite = quantities, subdivision, overwrite
 
     def prepare(self, problem: Problem, begin: float, until: float) -> None:
         if problem.mesh.dim == 1:  # NGSolve's writer leaves coordinates and derivatives of 1-d meshes unset

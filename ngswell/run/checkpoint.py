@@ -33,7 +33,7 @@ class Checkpoint:
     ) -> None:
         self.every = checks.number("Checkpoint: every", every, "s", low=0.0)
         checks.flag("Checkpoint: overwrite", overwrite)
-        self.path, self.overwrite = Path(path), overwrite
+        self.path, self.overwrite = checks.path("Checkpoint", path, "run.checkpoint"), overwrite
         self._when = When("Checkpoint", when)
         self._requested = False
         self._saved: float | None = None

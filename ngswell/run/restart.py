@@ -9,6 +9,7 @@ from typing import Any
 
 import ngsolve
 
+from ngswell import checks
 from ngswell.errors import InputError, Reason, Rejection
 from ngswell.files import Tree, read_tree, write_tree
 from ngswell.observers.base import Observer
@@ -86,7 +87,7 @@ def _step(entry: list[Any]) -> StepReport:
 
 def read_checkpoint(path: str | Path) -> Restart:
     """What a `Checkpoint` wrote to `path`. Raises InputError for a file that is none, or is damaged."""
-    path = Path(path)
+    path = checks.path("read_checkpoint", path, "run.checkpoint")
     if not path.is_file():
         raise InputError(f"{path}: there is no such file; name the one that a Checkpoint wrote")
     remedy = "go on from a copy of it, choose another name, or start anew with overwrite=True"

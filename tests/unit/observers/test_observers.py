@@ -6,7 +6,20 @@ import numpy as np
 import pytest
 from ngsolve import x, y
 
-from ngswell import VTK, Area, Concentration, Fixed, InputError, Integral, Potential, Probe, Progress, Ramp, Snapshots
+from ngswell import (
+    VTK,
+    Area,
+    Checkpoint,
+    Concentration,
+    Fixed,
+    InputError,
+    Integral,
+    Potential,
+    Probe,
+    Progress,
+    Ramp,
+    Snapshots,
+)
 from tests.scenes import FALLING, confined_column, strip
 
 
@@ -61,7 +74,9 @@ def test_integral_over_the_end_of_a_column_is_the_value_there(model):
         (lambda: Area(when=1e-300).plan(0.0, 10.0), "more than 1000000 records"),
         (lambda: Probe(0.5, "J"), "point.*got 0.5"),
         (lambda: Probe((0.5,), ["J"]), r"quantity.*got \['J'\]"),
-        (lambda: VTK(""), "path has to name the series"),
+        (lambda: VTK(""), "path has to be a file's"),
+        (lambda: VTK(-(10**6000), "J"), "path has to be a file's.*got a huge int"),  # Python writes no such number
+        (lambda: Checkpoint(5), "path has to be a file's.*got 5"),
         (lambda: Probe((0.0, 0.0)), "at least one quantity"),
     ],
 )
