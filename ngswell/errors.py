@@ -23,8 +23,9 @@ class OutputError(NgswellError, OSError):
 class Reason(Enum):
     """Why an attempt at a step, or a state of rest, was given up; the value says it in words."""
 
-    NOT_ADMISSIBLE_AT_START = "the step starts with {what} not positive"
+    NOT_ADMISSIBLE_AT_START = "the state at the start of the step has {what} not positive"
     NOT_ADMISSIBLE = "{what} would not stay positive"
+    TURNS_OVER = "a cell would turn over: {what} would not stay positive"
     NOT_A_SOLUTION = "{what} is not positive in the solution"
     STALLED = "Newton's method stalls: no damped step reduces the correction"
     TOO_MANY_ITERATIONS = "Newton's method needs more than {what} iterations"
@@ -32,6 +33,7 @@ class Reason(Enum):
     UNDETERMINED = "the linear system is singular: {what}"
     ESTIMATE_NOT_FINITE = "the estimated error is not finite"
     ERROR_ABOVE_TOLERANCE = "error above the tolerance"
+    OUT_OF_BALANCE = "the start is out of balance: {what}"
     UNSTABLE = "the state is unstable: {what}"
 
     def text(self, what: str = "") -> str:
@@ -45,9 +47,18 @@ _LOST = (
     "sideways and swells beyond J = 2.5 may wrinkle."
 )
 
+_TURNED = (
+    "Remedies: a smaller or slower load or change of the bath. At the edge where a held side meets a free one the strain is "
+    "singular, and cells that are very fine there fold: coarser cells at that edge, or an edge that is rounded."
+)
+
 REMEDIES = {
-    Reason.NOT_ADMISSIBLE_AT_START: _SQUEEZED,
+    Reason.NOT_ADMISSIBLE_AT_START: (
+        "Remedies: go on from an accepted state, `result.end`, `error.end` or a checkpoint; an initial bath and charge that "
+        "the body can have."
+    ),
     Reason.NOT_ADMISSIBLE: _SQUEEZED,
+    Reason.TURNS_OVER: _TURNED,
     Reason.NOT_A_SOLUTION: (
         "Remedies: Penalty or Multiplier in place of Nitsche; where anions are few, a slower change of bath or charge, "
         "finer cells at the bath; Potential(), whose ions cannot be negative."
@@ -58,6 +69,11 @@ REMEDIES = {
     Reason.ESTIMATE_NOT_FINITE: _LOST,
     Reason.UNDETERMINED: "Remedies: a support for what can move, a bath or a free side for a pressure.",
     Reason.ERROR_ABOVE_TOLERANCE: "Remedies: a larger tolerance, a gentler ramp, a finer mesh where the field is worst.",
+    Reason.OUT_OF_BALANCE: (
+        "Remedies: a charge that is raised in time, charge=Ramp((0, 0), (4000, 1)); a start at rest, "
+        "resume=scene.equilibrate(); a traction that carries the pressure of the charged body; where the sudden load is "
+        "meant, finer cells at the baths."
+    ),
     Reason.UNSTABLE: (
         "Remedies: to let it grow, an imperfection that seeds it, steps well below that time and Stability(follow=True); to "
         "avoid it, a bath of more salt, a surface that is held, or Confined, which leaves wrinkles out."

@@ -14,8 +14,12 @@ from ngswell.baths.treatment import Charge
 from ngswell.errors import UNCONVERGED, Failure, NgswellError, Reason, place
 from ngswell.mesh.points import vertices
 from ngswell.problem.discretisation import Snapshot
+from ngswell.problem.forms import form
 from ngswell.problem.problem import Problem
 from ngswell.setup.rigid_motions import name_of_motion, rigid_motions
+
+BALANCED = 1e-2
+"""Share of the largest force that a state at rest leaves at most; Newton's tolerance leaves far less."""
 
 NONE_LEFT = 1e-10
 """A mode counts as a null vector when no row of its product exceeds this share of what the row's entries could add up to."""
@@ -55,11 +59,29 @@ def explain(problem: Problem, snapshot: Snapshot, dt: float, failure: Failure, d
     # Without fluid, the ions of a cell are undetermined too: that does not explain why fluid runs out.
     if found is not None and (failure.reason in UNCONVERGED or found.kind is not Undetermined.Kind.LOCAL):
         return found.failure
+    left, where = imbalance(problem)
+    if left > BALANCED:  # what is not at rest has no stability
+        said = f"the forces on the body leave {left:.0%} of the largest of them, most near {place(where)} mm"
+        return Failure(Reason.OUT_OF_BALANCE, "u", where, said)
     try:
         unstable = Perturbations(problem).fastest(1 / duration)
     except NgswellError:
         return None
     return None if unstable is None else Failure(Reason.UNSTABLE, "u", unstable.where, str(unstable))
+
+
+def imbalance(problem: Problem) -> tuple[float, tuple[float, ...]]:
+    """What the forces of the present state leave at the displacements that are free, as a share of the largest of them, and
+    the vertex [mm] where it is largest: at rest, what Newton's method leaves."""
+    force = problem.fields.vec.CreateVector()
+    u = problem.ranges[problem.names[0]]
+    left, largest = np.zeros(problem.vector.size), 0.0
+    for term in problem.terms:
+        form(problem, [term], 0.0).Apply(problem.fields.vec, force)
+        share = force.FV().NumPy()[u] * np.array(list(problem.free), dtype=float)[u]
+        left[u] += share
+        largest = max(largest, float(np.abs(share).max()))
+    return (float(np.abs(left).max()) / largest if largest else 0.0), problem.worst(left)[1]
 
 
 def singular_mode(problem: Problem) -> Undetermined | None:

@@ -32,9 +32,10 @@ def with_corners(shape: ET, order: int) -> IntegrationRule:
     return IntegrationRule([*inside, *corners], [*rule.weights, *(0.0 for _ in corners)])
 
 
-def points_and_corners(mesh: Mesh, order: int) -> NDArray:
-    """Mapped integration points of degree `order` on the cells of the body, and the cells' corners."""
-    return mesh.MapToAllElements({shape: with_corners(shape, order) for shape in _CORNERS}, VOL)
+def corners(mesh: Mesh) -> NDArray:
+    """Mapped corners of all cells of the body, each from the inside of its cell."""
+    rules = {shape: IntegrationRule(list(places), [0.0] * len(places)) for shape, places in _CORNERS.items()}
+    return mesh.MapToAllElements(rules, VOL)
 
 
 def integral_on_boundary(

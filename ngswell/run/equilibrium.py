@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ngswell import checks
 from ngswell.analysis.diagnosis import singular_mode
 from ngswell.baths.treatment import Charge
-from ngswell.errors import UNCONVERGED, Failure, InputError, StepError
+from ngswell.errors import UNCONVERGED, Failure, InputError, Reason, StepError
 from ngswell.observers.base import Observer
 from ngswell.problem.discretisation import Snapshot
 from ngswell.problem.problem import Problem
@@ -27,8 +27,11 @@ SMALLEST_SHARE = 1e-4
 STATIONARY = 1e30
 """A time step [s] beyond which contents do not change any more."""
 
-SHORTEST = 1e-12
-"""Relaxation gives up below this step [s]."""
+LONGEST, SHORTEST = 1e12, 1e-12
+"""Steps [s] that relaxation tries where the stationary balances are not solved at once."""
+
+SHRUNK = 1e-6
+"""Relaxation gives up when its steps have fallen below this share of the longest that succeeded."""
 
 
 def equilibrate(
@@ -86,7 +89,7 @@ class _Rest:
             if len(reached) > 1:
                 earlier, old = reached[-2]
                 guess = state + (target - share) / (share - earlier) * (state - old)
-            outcome = self._at_share(target, guess)
+            outcome = self._at_share(target, guess, state)
             if outcome.failure is None:
                 reached = [(share, state), (target, problem.vector.copy())]
                 step *= 2
@@ -101,23 +104,27 @@ class _Rest:
         """From the initial state to rest under what holds at the time; whether it is reached."""
         problem = self.problem
         problem.initialise()
-        step, state = STATIONARY, problem.vector.copy()
-        started = False
-        while step >= SHORTEST:
+        step, state, longest = STATIONARY, problem.vector.copy(), 0.0
+        while step >= max(SHORTEST, SHRUNK * longest):
             problem.begin_step(self.time, step)
             if self.newton.solve(problem, self.factorisation).failure is None:
                 if step == STATIONARY:
                     return True
-                started, state = True, problem.vector.copy()
-                step = min(10 * step, STATIONARY)
+                longest, state = max(longest, step), problem.vector.copy()
+                step = 10 * step if step < LONGEST else STATIONARY
             else:
                 problem.vector[:] = state
-                step /= 20 if started else 1e3  # 20 undoes the last growth and halves
+                step = min(LONGEST, step / (20 if longest else 1e3))  # 20 undoes the last growth and halves
         return False
 
-    def _at_share(self, share: float, guess: NDArray) -> Outcome:
-        self.problem.begin_step(self.time, STATIONARY, guess, charge_share=share)
-        return self.newton.solve(self.problem, self.factorisation)
+    def _at_share(self, share: float, *guesses: NDArray) -> Outcome:
+        """The state of rest at a share of the charge, from the first of the guesses that is admissible."""
+        for guess in guesses:
+            self.problem.begin_step(self.time, STATIONARY, guess, charge_share=share)
+            outcome = self.newton.solve(self.problem, self.factorisation)
+            if outcome.failure is None or outcome.failure.reason is not Reason.NOT_ADMISSIBLE_AT_START:
+                break
+        return outcome
 
     def _failed(self, share: float, failure: Failure) -> StepError:
         found = singular_mode(self.problem) if failure.reason in UNCONVERGED else None

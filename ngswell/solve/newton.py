@@ -97,7 +97,7 @@ class _Iteration:
             fresh = not known
             self.correction.data = self.simplified
         if self.beyond:
-            return self._violated(Reason.NOT_ADMISSIBLE, self.beyond)
+            return self._violated(self.beyond.reason, self.beyond)
         return self._failed(Reason.TOO_MANY_ITERATIONS, str(self.method.most_iterations))
 
     def _damp(self, fresh: bool) -> tuple[Outcome | None, bool, float]:
@@ -128,7 +128,7 @@ class _Iteration:
             if damping < least:
                 vector[:] = start
                 if self.beyond:
-                    return self._violated(Reason.NOT_ADMISSIBLE, self.beyond), False, damping
+                    return self._violated(self.beyond.reason, self.beyond), False, damping
                 return self._failed(Reason.STALLED), False, damping
         if not fresh and (refused or not rate < 1):
             vector[:] = start

@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 
-import numpy as np
 import pytest
 from netgen.occ import Compound, Glue, MoveTo, Y
 from ngsolve import VOL, x, y
@@ -27,10 +26,11 @@ from ngswell import (
     from_occ,
     rectangle,
 )
-from ngswell.analysis.diagnosis import singular_mode
+from ngswell.analysis.diagnosis import imbalance, singular_mode
+from ngswell.errors import Reason
 from ngswell.mesh.parts import connected_parts
-from ngswell.mesh.points import points, points_and_corners
-from tests.scenes import UNCHARGED, confined_column, strip
+from ngswell.mesh.points import corners, points
+from tests.scenes import P0, UNCHARGED, confined_column, strip
 
 MODELS = {
     "Uncharged": (Uncharged(), UNCHARGED, None),
@@ -132,21 +132,18 @@ def test_a_regular_system_is_not_called_singular(model, dt):
         assert singular_mode(problem) is None
 
 
-def test_a_cell_that_turns_over_at_a_corner_is_found(monkeypatch):
-    """J − nS0 is watched where cells turn over first: here at one corner, while it is positive at all integration points."""
-    problem = strip(mesh=rectangle(1.0, 1.0, 1, 1), loads=[]).problem
+def test_a_cell_that_turns_over_at_a_corner_is_found():
+    """J is watched where cells turn over first: here at one corner, while it is positive at all integration points."""
+    problem = strip(mesh=rectangle(1.0, 1.0, 1, 1), loads=[], material=replace(TABLE_1, nS0=0.05)).problem
     problem.initialise()
-    # Only the middle of the bottom edge moves: J falls along this edge.
-    problem.fields.components[0].Set((0.2 * x * (1 - x) * (1 - y), 0 * y))
-    assert problem.admissible.violation() is None
-    problem.fields.components[0].Set((0.85 * x * (1 - x) * (1 - y), 0 * y))
-    name, where = problem.admissible.violation()
-    assert name == "fluid content J − nS0"
-    assert where == pytest.approx((1.0, 0.0))
-    inside = problem.state.content(problem.points)
-    assert inside.min() > 0
-    assert np.isfinite(problem.state.J(problem.mesh(1.0, 0.0)))
-    assert problem.state.J(problem.mesh(1.0, 0.0)) < TABLE_1.nS0
+    # Only the middle of the bottom edge moves: J falls along this edge, to 1 − a at its end.
+    for a, found in ((0.9, None), (1.1, Reason.TURNS_OVER)):
+        problem.fields.components[0].Set((a * x * (1 - x) * (1 - y), 0 * y))
+        violation = problem.admissible.violation()
+        assert (violation and violation.reason) is found
+        assert problem.state.J(problem.mesh(1.0, 0.0)) == pytest.approx(1 - a, abs=1e-12)
+    assert violation.where == pytest.approx((1.0, 0.0))
+    assert problem.state.content(problem.points).min() > 0
 
 
 def crushed(load):
@@ -161,17 +158,42 @@ def crushed(load):
     )
 
 
-def content_at_corners(scene, snapshot):
-    return scene.state(snapshot).content(points_and_corners(scene.mesh, 6)).min()
+def smallest_at_corners(scene, snapshot):
+    return scene.state(snapshot).J(corners(scene.mesh)).min()
 
 
 def test_a_run_ends_before_a_cell_turns_over(monkeypatch):
     scene = crushed(3.0)
-    with pytest.raises(StepError, match="fluid content J − nS0 would not stay positive") as caught:
+    with pytest.raises(StepError, match="a cell would turn over: J at a cell's corner would not stay positive") as caught:
         scene.run(1e4, Fixed(1e3))
-    assert content_at_corners(scene, caught.value.end) > 0
+    assert smallest_at_corners(scene, caught.value.end) > 0
     # Control: watched at the forms' own points alone, the run passes with a corner turned inside out, J = −0.24.
-    monkeypatch.setattr("ngswell.problem.admissible.points_and_corners", lambda mesh, order: points(mesh, VOL, order))
+    monkeypatch.setattr("ngswell.problem.admissible.corners", lambda mesh: points(mesh, VOL, 6))
     scene = crushed(3.0)
     result = scene.run(1e4, Fixed(1e3))
-    assert content_at_corners(scene, result.end) < -TABLE_1.nS0
+    assert smallest_at_corners(scene, result.end) < -0.2
+
+
+# -- starts that are out of balance --------------------------------------------------------------------------------------
+
+
+def released(cells, load, **changes):
+    """A body of Table 1 with a bath on one side, under less than the traction that carries its charge."""
+    fields = {
+        "mesh": rectangle(1.0, 1.0, cells, cells),
+        "kinematics": PlaneStrain(),
+        "material": TABLE_1,
+        "supports": [Symmetry("bottom"), Symmetry("left")],
+        "baths": [Bath("right", c=0.15)],
+        "loads": [Traction("top", (0.0, -load)), Traction("right", (-load, 0.0))],
+    }
+    return Scene(**fields | changes)
+
+
+@pytest.mark.parametrize("load", [P0, 0.05])
+def test_what_a_start_leaves_of_its_forces(load):
+    """In balance under p0; under less, the top leaves what the load lacks: (p0 − load)/p0 of the pressure's force."""
+    problem = released(3, load).problem
+    problem.initialise()
+    assert imbalance(problem)[0] == pytest.approx((P0 - load) / P0, abs=1e-6)  # p0 has seven digits
+    assert imbalance(problem)[1][1] == 1.0 or load == P0
