@@ -167,7 +167,7 @@ def test_table_2_is_admissible_and_a_passed_pole_is_not():
     problem.initialise()
     assert problem.admissible.violation() is None
     problem.fields.components[0].Set((0 * x, -0.8 * y))
-    name, where = problem.admissible.violation()
+    name, where, _ = problem.admissible.violation()
     assert "J − nS0" in name
     assert len(where) == 2
     problem.initialise()
