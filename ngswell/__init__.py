@@ -1,10 +1,13 @@
 """Swelling of charged hydrated porous media on NGSolve. Units mm, N, s, K, mol/l.
 
-Folders, each importing only from those above it: errors, checks, files, schedules · mesh · physics · models · baths ·
+Folders, each importing only from those above it: errors, calls, checks, files, schedules · mesh · physics · models · baths ·
 setup · problem · solve · stepping · analysis · observers · run · scene; closed_forms and plotting stand beside them.
 """
 
 from __future__ import annotations
+
+import inspect
+from enum import Enum
 
 from ngswell.baths.bath import Bath
 from ngswell.baths.lagged import Averaged, InnerLayer, Lagged, LeastSquares
@@ -13,6 +16,7 @@ from ngswell.baths.nitsche import Nitsche
 from ngswell.baths.penalty import Penalty
 from ngswell.baths.prescribed import Essential, Frozen
 from ngswell.baths.treatment import Prescribed, Weak
+from ngswell.calls import refusing
 from ngswell.errors import InputError, InstabilityError, NgswellError, OutputError, Reason, StepError
 from ngswell.mesh.gmsh import read_mesh
 from ngswell.mesh.shapes import box, check_mesh, column, from_occ, rectangle
@@ -60,3 +64,9 @@ __all__ = [
     "Uncharged", "Weak", "Weight", "box", "check_mesh", "column", "from_occ", "read_checkpoint", "read_mesh",
     "rectangle",
 ]  # fmt: skip
+
+for _name in __all__:
+    if inspect.isroutine(_thing := globals()[_name]) or (
+        inspect.isclass(_thing) and not issubclass(_thing, (Exception, Enum))
+    ):
+        globals()[_name] = refusing(_thing)

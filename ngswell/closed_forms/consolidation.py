@@ -14,6 +14,7 @@ from math import ceil, inf, pi, sqrt
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ngswell.calls import refusing
 from ngswell.closed_forms.homogeneous import parameters
 from ngswell.errors import InputError
 from ngswell.physics.material import Material
@@ -23,11 +24,13 @@ EARLIEST = 1e-8
 """Dimensionless time below which the series are refused: they would need more than 20 000 terms."""
 
 
+@refusing
 def consolidation_coefficient(material: Material) -> float:
     """c_v = K (2µ + λ) [mm²/s]."""
     return material.number("K") * _confined_modulus(material)
 
 
+@refusing
 def terzaghi_pressure(material: Material, load: float, height: float, z: ArrayLike, time: ArrayLike) -> NDArray:
     """Excess pressure [N/mm²] at `z` [mm] above the sealed bottom of a confined column, loaded and drained at its top.
 
@@ -39,6 +42,7 @@ def terzaghi_pressure(material: Material, load: float, height: float, z: ArrayLi
     return load * (2 * np.sin(alpha) / alpha * np.cos(alpha * xi) * np.exp(-(alpha**2) * T)).sum(axis=-1)
 
 
+@refusing
 def terzaghi_settlement(material: Material, load: float, height: float, time: ArrayLike) -> NDArray:
     """Downward displacement of the column's top [mm]:  load h/M [1 − Σ (2/α²) exp(−α² T)]."""
     _, T = _scaled(material, "height", height, 0.0, time)
@@ -46,6 +50,7 @@ def terzaghi_settlement(material: Material, load: float, height: float, time: Ar
     return load * height / _confined_modulus(material) * (1 - (2 / alpha**2 * np.exp(-(alpha**2) * T)).sum(axis=-1))
 
 
+@refusing
 def mandel_pressure(material: Material, load: float, half_width: float, x: ArrayLike, time: ArrayLike) -> NDArray:
     """Excess pressure [N/mm²] at `x` [mm] from the middle of a slab in plane strain, squeezed between rigid, smooth, sealed
     plates by the mean stress `load`, drained at its free sides x = ±a.
@@ -61,6 +66,7 @@ def mandel_pressure(material: Material, load: float, half_width: float, x: Array
     return load * (amplitude * (np.cos(alpha * xi) - np.cos(alpha)) * np.exp(-(alpha**2) * T)).sum(axis=-1)
 
 
+@refusing
 def mandel_shortening(material: Material, load: float, half_width: float, time: ArrayLike) -> NDArray:
     """Compressive strain of Mandel's slab between the plates [-], uniform, with p̄ the mean pressure:
 
@@ -73,6 +79,7 @@ def mandel_shortening(material: Material, load: float, half_width: float, time: 
     return (load * (2 * mu + lam) / (2 * mu) - mean) / (2 * mu + 2 * lam)
 
 
+@refusing
 def cryer_pressure(material: Material, load: float, radius: float, r: ArrayLike, time: ArrayLike) -> NDArray:
     """Excess pressure [N/mm²] at `r` [mm] from the centre of a sphere, under the normal stress `load` and drained all over.
 
@@ -91,6 +98,7 @@ def cryer_pressure(material: Material, load: float, radius: float, r: ArrayLike,
     return load * (2 * shape / denominator * np.exp(-(alpha**2) * T)).sum(axis=-1)
 
 
+@refusing
 def cryer_settlement(material: Material, load: float, radius: float, time: ArrayLike) -> NDArray:
     """Inward displacement of the surface of Cryer's sphere [mm]:
 

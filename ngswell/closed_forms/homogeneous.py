@@ -8,12 +8,14 @@ from math import sqrt
 
 from ngswell import checks
 from ngswell.baths.bath import checked_salt
+from ngswell.calls import refusing
 from ngswell.errors import InputError
 from ngswell.physics import donnan
 from ngswell.physics.material import Material
 from ngswell.physics.solid import homogeneous_response, small_strain_moduli
 
 
+@refusing
 @dataclass(frozen=True)
 class Equilibrium:
     """A homogeneous swollen state: J [-], cfc [mol/l], nS [-], c [mol/l], p [N/mm²]."""
@@ -29,6 +31,7 @@ SMALLEST, LARGEST_CONTENT = 1e-12, 1e9
 """Fluid contents between which an equilibrium is looked for: the first in units of nS0."""
 
 
+@refusing
 def parameters(material: Material) -> tuple[float, float]:
     """nS0 [-] and cfc0 [mol/l] as numbers; InputError if they, or parameters of the solid, vary in space."""
     for name in ("mu", "lam"):
@@ -39,6 +42,7 @@ def parameters(material: Material) -> tuple[float, float]:
 FREE_DIRECTIONS = {"confined": 1, "plane strain": 2, "3-d": 3}
 
 
+@refusing
 def homogeneous_equilibrium(
     material: Material,
     salt: float,
@@ -102,6 +106,7 @@ def _root(function: Callable[[float], float], low: float, high: float) -> float 
     return high
 
 
+@refusing
 def lagged_column_factor(material: Material, salt: float) -> float:
     """Factor by which one step of the lagged boundary multiplies a perturbation of a confined column's end [-].
 

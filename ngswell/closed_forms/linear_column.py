@@ -24,6 +24,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ngswell import checks
 from ngswell.baths.bath import checked_salt
+from ngswell.calls import refusing
 from ngswell.closed_forms.homogeneous import parameters
 from ngswell.errors import InputError
 from ngswell.physics.material import Material
@@ -62,6 +63,7 @@ def _gel(material: Material, bath: float) -> _Gel:
     return _Gel(plus, minus, total, cfc0, 1 - nS0, 2 * mu + lam, material.RT, share, D_plus, D_minus, K)
 
 
+@refusing
 def storage(material: Material, bath: float) -> NDArray:
     """C: contents (J [-], n [mol/l]) per potential (P, Σ) in a confined motion under a constant load.
 
@@ -75,6 +77,7 @@ def storage(material: Material, bath: float) -> NDArray:
     return coupled + np.array([[0.0, 0.0], [0.0, g.nF * g.share / (2 * g.RT)]])
 
 
+@refusing
 def conductance(material: Material, bath: float) -> NDArray:
     """L: fluxes (nF wF [mm/s], nF c₊ w₊ [mol/l mm/s]) per falling gradient of (P, Σ), eqs. (19) to (22) without current.
 
@@ -92,6 +95,7 @@ def conductance(material: Material, bath: float) -> NDArray:
     return convection + np.array([[0.0, 0.0], [0.0, a_plus * a_minus / (a_plus + a_minus)]])
 
 
+@refusing
 def potentials(material: Material, bath: float, salt: float = 0.0, hydraulic: float = 0.0) -> NDArray:
     """(P, Σ) of a bath whose concentration differs by `salt` [mol/l] and pressure by `hydraulic` [N/mm²] from c̄, P̄:
 
@@ -101,6 +105,7 @@ def potentials(material: Material, bath: float, salt: float = 0.0, hydraulic: fl
     return np.array([hydraulic - 2 * RT * salt, 2 * RT * salt / bath])
 
 
+@refusing
 def penalty_efflux(material: Material, bath: float, relative: float, cell: float) -> NDArray:
     """G: effluxes (fluid [mm/s], cations [mol/l mm/s]) per excess of (P, Σ) over a bath with `Penalty(relative=...)`.
 
@@ -114,6 +119,7 @@ def penalty_efflux(material: Material, bath: float, relative: float, cell: float
     return relative / cell * np.array([[g.K, g.K * g.share], [0.0, g.D_plus * g.share / (2 * g.RT)]])
 
 
+@refusing
 def diffusivities(storage: NDArray, conductance: NDArray) -> tuple[NDArray, NDArray]:
     """Eigenvalues κ [mm²/s] of L v = κ C v, ascending, and the modes v in columns, with vᵀ C v = 1."""
     root = np.linalg.inv(np.linalg.cholesky(storage))
@@ -121,6 +127,7 @@ def diffusivities(storage: NDArray, conductance: NDArray) -> tuple[NDArray, NDAr
     return values, root.T @ vectors
 
 
+@refusing
 def uniform_gel_fluxes(
     material: Material, bath: float, thickness: float, salt: float = 0.0, hydraulic: float = 0.0
 ) -> tuple[float, float]:
@@ -134,6 +141,7 @@ def uniform_gel_fluxes(
     return float(fluid), float(cations)
 
 
+@refusing
 @dataclass(frozen=True)
 class LinearColumn:
     """A confined column on a sealed, fixed bottom x = 0 in equilibrium with a `bath` [mol/l] on top, x = `height` [mm].

@@ -14,6 +14,7 @@ import numpy as np
 from ngsolve import Mesh
 from numpy.typing import NDArray
 
+from ngswell import checks
 from ngswell.errors import InputError, place
 from ngswell.mesh.shapes import check_mesh, check_named, check_plane
 
@@ -53,8 +54,9 @@ def read_mesh(path: str | Path) -> Mesh:
     Physical groups of curves (2-d) or surfaces (3-d) name the boundaries, those of the body its materials. Sides without
     a group are sealed and free. Raises InputError for files that cannot be read or meant.
     """
+    file = checks.path("read_mesh", path, "body.msh")
     what = f"read_mesh {path}"
-    points, groups = _read(what, Path(path))
+    points, groups = _read(what, file)
     dim = max((key[0] for key in groups), default=0)
     if dim < 2:
         raise InputError(f"{what}: there are no cells of 2 or 3 dimensions; a 1-d mesh is made by column()")

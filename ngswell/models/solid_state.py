@@ -8,6 +8,8 @@ from functools import cached_property
 
 from ngsolve import CoefficientFunction, Cof, Det, Id, InnerProduct, Inv, Mesh
 
+from ngswell import checks
+from ngswell.calls import refusing
 from ngswell.checks import Field
 from ngswell.errors import InputError
 from ngswell.models.model import FieldContext
@@ -18,6 +20,7 @@ from ngswell.physics.material import Material
 from ngswell.physics.solid import Deformation, extra_stress
 
 
+@refusing
 @dataclass(frozen=True)
 class SolidState:
     """The deformed solid, of trial functions or of a result. A model adds its fields and `pore_pressure` [N/mm²]."""
@@ -124,9 +127,9 @@ class SolidState:
 
     def at(self, point: Sequence[float], name: str) -> float | tuple[float, ...]:
         """An output of a result at a point of the reference configuration [mm], in the unit of `OUTPUT_UNITS`."""
-        mesh = self.mesh
+        mesh, point = self.mesh, checks.vector("a point", point, 1e6, "mm")
         if len(point) != mesh.dim or not mesh.Contains(*point):
-            raise InputError(f"{tuple(point)} is not a point of the {mesh.dim}-d body")
+            raise InputError(f"{point} is not a point of the {mesh.dim}-d body")
         return self.output(name)(mesh(*point))
 
     def solid_outputs(self, pore_pressure: CoefficientFunction) -> dict[str, CoefficientFunction]:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any
 
+from ngswell import checks
+from ngswell.errors import InputError
 from ngswell.observers.base import Observer
 from ngswell.problem.problem import Problem
 
@@ -17,6 +19,8 @@ class Call(Observer):
     """
 
     def __init__(self, function: Callable[[float, Any], object], when: float | Sequence[float] | None = None) -> None:
+        if not callable(function):
+            raise InputError(f"Call has to be given a function of time and state, got {checks.short(function)}")
         super().__init__(when, getattr(function, "__qualname__", type(function).__name__))
         self.function = function
 

@@ -10,6 +10,7 @@ import numpy as np
 from ngsolve import CF, H1, VOL, BitArray, Compress, FESpace, GridFunction
 from numpy.typing import NDArray
 
+from ngswell import checks
 from ngswell.errors import InputError
 from ngswell.mesh.points import points, vertices
 from ngswell.models.model import BathFields, FieldContext
@@ -92,6 +93,7 @@ class Discretisation:
 
     def check(self, what: str, snapshot: Snapshot) -> None:
         """Refuse a snapshot of another discretisation."""
+        checks.instance(what, snapshot, Snapshot, "a snapshot, such as `result.end`")
         if snapshot.values.shape != (self.space.ndof,):
             raise InputError(f"{what}: the snapshot has {snapshot.values.size} unknowns, the scene {self.space.ndof}")
 

@@ -1,0 +1,51 @@
+"""Calls with the wrong arguments, refused like every other bad input."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from difflib import get_close_matches
+from functools import wraps
+from typing import Any, TypeVar
+
+from ngswell.errors import InputError
+
+Thing = TypeVar("Thing")
+
+
+def refusing(thing: Thing) -> Thing:
+    """A public function, or a class with its constructor and public methods, that refuses calls which do not fit it.
+
+    Raises InputError where Python's own error would not say what the call takes.
+    """
+    if not inspect.isclass(thing):
+        return _refusing(thing, thing.__name__, inspect.signature(thing))  # type: ignore[attr-defined,arg-type,return-value]
+    for name, member in list(vars(thing).items()):
+        if inspect.isfunction(member) and (name == "__init__" or not name.startswith("_")):
+            what = thing.__name__ if name == "__init__" else f"{thing.__name__}.{name}"
+            setattr(thing, name, _refusing(member, what, inspect.signature(member)))
+    return thing
+
+
+def _refusing(function: Callable, what: str, signature: inspect.Signature) -> Callable:
+    takes = [name for name in signature.parameters if name != "self"]
+    by_name = all(signature.parameters[name].kind is inspect.Parameter.KEYWORD_ONLY for name in takes)
+
+    @wraps(function)
+    def call(*arguments: Any, **named: Any) -> Any:
+        try:
+            return function(*arguments, **named)
+        except TypeError:
+            try:
+                signature.bind(*arguments, **named)
+            except TypeError as misfit:
+                fault = next((_unknown(name, takes) for name in named if name not in takes), str(misfit))
+                raise InputError(f"{what}: {fault}; it takes {'by name: ' if by_name else ''}{', '.join(takes)}") from None
+            raise
+
+    return call
+
+
+def _unknown(name: str, takes: list[str]) -> str:
+    meant = get_close_matches(name, takes, 1)
+    return f"there is no argument {name!r}" + (f"; {meant[0]!r} may be meant" if meant else "")
