@@ -90,7 +90,7 @@ class Control(Protocol):
 
 @dataclass(frozen=True)
 class Fixed:
-    """Steps of one size [s], shortened to land on kinks and where Newton's method fails."""
+    """Steps of one size [s], shortened to land on kinks and where Newton's method fails; then they grow back by doubling."""
 
     step: float
     scheme: Scheme = BACKWARD_EULER
@@ -107,7 +107,7 @@ class Fixed:
         return self.step
 
     def next(self, dt: float, error: float, power: float) -> float:
-        return self.step
+        return min(self.step, 2 * dt)
 
     def accepts(self, error: float) -> bool:
         return True
