@@ -66,8 +66,14 @@ def explain(problem: Problem, snapshot: Snapshot, dt: float, failure: Failure, d
     try:
         unstable = Perturbations(problem).fastest(1 / duration)
     except NgswellError:
-        return None
-    return None if unstable is None else Failure(Reason.UNSTABLE, "u", unstable.where, str(unstable))
+        unstable = None
+    return folded(problem) if unstable is None else Failure(Reason.UNSTABLE, "u", unstable.where, str(unstable))
+
+
+def folded(problem: Problem) -> Failure | None:
+    """Where the present state has a corner of a cell turned over, squeezed or not: its next steps may fail for that."""
+    found = problem.admissible.turned(fluid=1.0)
+    return None if found is None else Failure(found.reason, found.what, found.where, found.what)
 
 
 def imbalance(problem: Problem) -> tuple[float, tuple[float, ...]]:

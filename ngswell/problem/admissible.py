@@ -23,12 +23,11 @@ class Violation(NamedTuple):
     reason: Reason
 
 
-class Bound(NamedTuple):
-    """A field that has to be positive at points."""
+TURNED = "J at a cell's corner"
+"""What is not positive where a cell turns over."""
 
-    field: CoefficientFunction
-    where: NDArray
-    reason: Reason = Reason.NOT_ADMISSIBLE
+SQUEEZED = 0.25
+"""Share of fluid below which a cell counts as squeezed."""
 
 
 class Admissible:
@@ -38,35 +37,63 @@ class Admissible:
         self._discretisation, self._state = discretisation, state
 
     @cached_property
-    def always(self) -> dict[str, Bound]:
-        """At the forms' own points, where laws are evaluated; J at the cells' corners too, where cells turn over first.
-
-        J − nS0 is not asked for at corners: no law sees it there, and where a bonded edge meets a wet side it falls below
-        zero at the singular corner of a fine mesh while the solution at the points converges.
-        """
-        problem = self._discretisation
-        content = self._at_own_points({"fluid content J − nS0": self._state.content})
-        turned = {"J at a cell's corner": Bound(self._state.J.Compile(), corners(problem.mesh), Reason.TURNS_OVER)}
-        return content | turned | self._at_own_points(problem.model.bounds(self._state))
+    def always(self) -> dict[str, CoefficientFunction]:
+        """At the forms' own points, where laws are evaluated."""
+        content = {"fluid content J − nS0": self._state.content}
+        return _compiled(content | self._discretisation.model.bounds(self._state))
 
     @cached_property
-    def in_solutions(self) -> dict[str, Bound]:
+    def in_solutions(self) -> dict[str, CoefficientFunction]:
         """None where a bath takes the charge of the last step: it may oscillate and drive anions below zero, and whoever
         chooses it wants to see that."""
         problem = self._discretisation
         if any(treatment.charge_of is Charge.LAST_STEP for _, treatment in problem.setup.prescribed_baths):
             return {}
-        return self._at_own_points(problem.model.solution_bounds(self._state))
-
-    def _at_own_points(self, bounds: dict[str, Any]) -> dict[str, Bound]:
-        return {name: Bound(field.Compile(), self._discretisation.points) for name, field in bounds.items()}
+        return _compiled(problem.model.solution_bounds(self._state))
 
     def violation(self, solution: bool = False) -> Violation | None:
         """What leaves the physical range of iterates (or of a `solution`) at a watched point; None if nothing does."""
-        for name, (field, where, reason) in (self.in_solutions if solution else self.always).items():
-            values = field(where).ravel()
+        points = self._discretisation.points
+        for name, field in (self.in_solutions if solution else self.always).items():
+            values = field(points).ravel()
             worst = int(np.argmin(np.where(np.isfinite(values), values, -np.inf)))
             if not values[worst] > 0:
-                place = CF((x, y, z)[: self._discretisation.mesh.dim])(where[worst : worst + 1]).ravel()
-                return Violation(name, tuple(map(float, place)), reason)
-        return None
+                return Violation(name, self._place(points[worst : worst + 1]), Reason.NOT_ADMISSIBLE)
+        return None if solution else self.turned()
+
+    def turned(self, fluid: float = SQUEEZED) -> Violation | None:
+        """A cell that has turned over at a corner, and is squeezed: at a point of its own, at most this share is fluid.
+
+        Where a bonded edge meets a wet side the strain is singular, and J at the corner overshoots, below nS0 and even below
+        zero, while no law sees it and the solution converges.
+        """
+        at_corners = self._J(self._corners).ravel()
+        if at_corners.min() > 0:
+            return None
+        points = self._discretisation.points
+        least = np.ones(self._discretisation.mesh.ne)
+        np.minimum.at(least, points["nr"], self._nF(points).ravel())
+        at_corners[least[self._corners["nr"]] > fluid] = np.inf
+        worst = int(np.argmin(at_corners))
+        if at_corners[worst] > 0:
+            return None
+        return Violation(TURNED, self._place(self._corners[worst : worst + 1]), Reason.TURNS_OVER)
+
+    @cached_property
+    def _J(self) -> CoefficientFunction:
+        return self._state.J.Compile()
+
+    @cached_property
+    def _nF(self) -> CoefficientFunction:
+        return self._state.nF.Compile()
+
+    @cached_property
+    def _corners(self) -> NDArray:
+        return corners(self._discretisation.mesh)
+
+    def _place(self, where: NDArray) -> tuple[float, ...]:
+        return tuple(map(float, CF((x, y, z)[: self._discretisation.mesh.dim])(where).ravel()))
+
+
+def _compiled(bounds: dict[str, CoefficientFunction]) -> dict[str, CoefficientFunction]:
+    return {name: field.Compile() for name, field in bounds.items()}

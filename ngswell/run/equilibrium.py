@@ -8,7 +8,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from ngswell import checks
-from ngswell.analysis.diagnosis import singular_mode
+from ngswell.analysis.diagnosis import folded, singular_mode
 from ngswell.baths.treatment import Charge
 from ngswell.errors import UNCONVERGED, Failure, InputError, Reason, StepError
 from ngswell.observers.base import Observer
@@ -128,7 +128,7 @@ class _Rest:
 
     def _failed(self, share: float, failure: Failure) -> StepError:
         found = singular_mode(self.problem) if failure.reason in UNCONVERGED else None
-        cause = None if found is None else found.failure
+        cause = folded(self.problem) if found is None else found.failure
         self.problem.initialise()
         start = self.problem.setup.start
         opening = f"equilibrate finds no state of rest, at {share:.3g} of the charge"

@@ -1,12 +1,13 @@
 """Hard cases: each passes with its error, or ends with an exception that says why and a usable last state.
 
-Eleven families, both models, and every stable treatment of a bath where it makes a difference: `bath_range` and `penalties`
-(`baths.py`), `sudden_steps` and `cycles` (`time.py`), `charge`, `contrasts`, `corner`, `compression`, `swelling`, `cells`
-and `wrinkles` (each in the file of its name). The CSV has a row an attempt; docs/hard_cases.md says what is compared and
-why each bound is what it is. An attempt is `wrong` if its error exceeds its bound, its ledger does not close, or it leaves
-fields that are not finite and admissible. Numbers:
+Families, with both models, and every stable treatment of a bath where it makes a difference: `bath_range` and `penalties`
+(`baths.py`), `sudden_steps` and `cycles` (`time.py`), `bonded` and `releases` (`bonded.py`), `charge`, `contrasts`,
+`corner`, `compression`, `swelling`, `cells` and `wrinkles` (each in the file of its name). The CSV has a row an attempt;
+docs/hard_cases.md says what is compared and why each bound is what it is. An attempt is `wrong` if its error exceeds its
+bound, its ledger does not close, or it leaves fields that are not finite and admissible. Numbers:
 
-- `FAMILY_passes`, `FAMILY_stops` (StepError), `FAMILY_refused` (InputError), `FAMILY_wrong`: attempts; `wrong`: of all;
+- `FAMILY_passes`, `FAMILY_stops` (StepError), `FAMILY_refused` (InputError), `FAMILY_wrong`: attempts;
+- `attempts`, `passes`, `stops`, `refused`, `wrong`: of all families;
 - `FAMILY_error_over_bound`, `FAMILY_imbalance`: the largest of those that pass;
 - `alternation_lowest`, `alternation_above_limit`: lowest share of the jump [-] after one step, of all steps and of those
   with 6 κ Δt > h²; `alternation_difference` to the closed form;
@@ -30,7 +31,7 @@ import numpy as np
 from ngsolve import SetNumThreads
 from tqdm import tqdm
 
-from studies.hard_cases import baths, cells, charge, compression, contrasts, corner, swelling, time, wrinkles
+from studies.hard_cases import baths, bonded, cells, charge, compression, contrasts, corner, swelling, time, wrinkles
 from studies.hard_cases.attempt import Attempt
 from studies.hard_cases.figure import draw
 from studies.output import Findings
@@ -45,6 +46,8 @@ FAMILIES: dict[str, Callable[[bool], list[Attempt]]] = {
         baths.penalties,
         time.cycles,
         corner.corner,
+        bonded.bonded,
+        bonded.releases,
         compression.compression,
         swelling.swelling,
         cells.cells,
@@ -118,7 +121,10 @@ def counted(attempts: dict[str, list[Attempt]]) -> dict[str, float | int | str]:
         passing = [a for a in family if a.outcome == "passes"]
         numbers[f"{name}_error_over_bound"] = max(a.over_bound for a in passing)
         numbers[f"{name}_imbalance"] = max(a.imbalance or 0.0 for a in passing)
-    numbers["wrong"] = sum(a.outcome == "wrong" for family in attempts.values() for a in family)
+    everything = [a for family in attempts.values() for a in family]
+    numbers["attempts"] = len(everything)
+    for outcome in OUTCOMES:
+        numbers[outcome] = sum(a.outcome == outcome for a in everything)
     return numbers
 
 

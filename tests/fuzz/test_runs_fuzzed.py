@@ -57,6 +57,7 @@ from ngswell import (
 from ngswell.errors import Reason
 from ngswell.observers.base import Observer
 from ngswell.physics.pores import Constant
+from ngswell.problem.admissible import TURNED
 from ngswell.problem.forms import cell_size
 from ngswell.problem.problem import Problem
 from ngswell.stepping.schemes import Scheme
@@ -271,7 +272,7 @@ def check_stop(problem: Problem, stopped: StepError, watch: Watch) -> None:
     assert isinstance(stopped.reason, Reason)
     assert len(stopped.where) == problem.mesh.dim
     assert np.isfinite(stopped.where).all()
-    assert stopped.field in (*problem.names, *problem.admissible.always, *problem.admissible.in_solutions)
+    assert stopped.field in (*problem.names, *problem.admissible.always, *problem.admissible.in_solutions, TURNED)
     assert "nan" not in str(stopped)
 
 

@@ -133,17 +133,17 @@ def test_a_regular_system_is_not_called_singular(model, dt):
 
 
 def test_a_cell_that_turns_over_at_a_corner_is_found():
-    """J is watched where cells turn over first: here at one corner, while it is positive at all integration points."""
-    problem = strip(mesh=rectangle(1.0, 1.0, 1, 1), loads=[], material=replace(TABLE_1, nS0=0.05)).problem
-    problem.initialise()
-    # Only the middle of the bottom edge moves: J falls along this edge, to 1 − a at its end.
-    for a, found in ((0.9, None), (1.1, Reason.TURNS_OVER)):
-        problem.fields.components[0].Set((a * x * (1 - x) * (1 - y), 0 * y))
+    """J = −0.1 at one corner, and positive at all integration points: a cell turned over where these hold little fluid."""
+    for nS0, found in ((0.05, None), (0.11, Reason.TURNS_OVER)):
+        problem = strip(mesh=rectangle(1.0, 1.0, 1, 1), loads=[], material=replace(TABLE_1, nS0=nS0)).problem
+        problem.initialise()
+        # Only the middle of the bottom edge moves: J falls along this edge, to 1 − 1.1 at its end.
+        problem.fields.components[0].Set((1.1 * x * (1 - x) * (1 - y), 0 * y))
+        assert problem.state.J(problem.mesh(1.0, 0.0)) == pytest.approx(-0.1, abs=1e-12)
+        assert problem.state.content(problem.points).min() > 0
         violation = problem.admissible.violation()
         assert (violation and violation.reason) is found
-        assert problem.state.J(problem.mesh(1.0, 0.0)) == pytest.approx(1 - a, abs=1e-12)
     assert violation.where == pytest.approx((1.0, 0.0))
-    assert problem.state.content(problem.points).min() > 0
 
 
 def crushed(load):
