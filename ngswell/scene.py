@@ -51,7 +51,8 @@ class Scene(Setup):
             ]
             lines.append(f"  {balance}: {', '.join(names)}")
         for bath in self.baths:
-            lines.append(f"  bath on {bath.boundary}: {self.treatment(bath)}")
+            carried = "; a porous plate carries its pressure" if bath.porous_plate else ""
+            lines.append(f"  bath on {bath.boundary}: {self.treatment(bath)}{carried}")
         lines += [f"  {name}: {law}" for name, law in self.material.laws().items()]
         return "\n".join(lines)
 

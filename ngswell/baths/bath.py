@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from ngsolve import VOL
+from ngsolve import VOL, CoefficientFunction, InnerProduct
 
 from ngswell import checks
 from ngswell.baths.lagged import Lagged
@@ -15,7 +15,9 @@ from ngswell.baths.prescribed import Essential, Frozen
 from ngswell.baths.treatment import Prescribed, Surroundings, Treatment, Weak
 from ngswell.errors import InputError
 from ngswell.mesh.points import points
-from ngswell.models.model import Model
+from ngswell.models.model import BathFields, Model
+from ngswell.models.term import Role, Term
+from ngswell.physics.kinematics import Kinematics
 from ngswell.schedules import Schedule, schedule
 
 
@@ -45,14 +47,17 @@ class Bath:
     """A salt bath on a boundary ("top" or "top|left").
 
     `c` is the salt concentration c̄ [mol/l] (none for models without ions), `P` the hydraulic pressure P̄ [N/mm²]; each a
-    number or a schedule. Without a `treatment` the model's default applies. Raises InputError for a concentration that is
-    below 1e-12 or beyond 10 mol/l. `salt` and `hydraulic` are the histories of c and P.
+    number or a schedule. A bath is a fluid: P̄ presses on the boundary, with −P̄ n per current area, beside all other loads.
+    With `porous_plate=True` a porous plate on the boundary carries P̄, so that the body bears nothing but its other loads.
+    Without a `treatment` the model's default applies. Raises InputError for a concentration that is below 1e-12 or beyond
+    10 mol/l. `salt` and `hydraulic` are the histories of c and P.
     """
 
     boundary: str
     c: float | Schedule | None = None
     P: float | Schedule = 0.0
     treatment: Treatment | None = None
+    porous_plate: bool = False
     salt: Schedule | None = field(init=False, repr=False, compare=False)
     hydraulic: Schedule = field(init=False, repr=False, compare=False)
 
@@ -66,6 +71,7 @@ class Bath:
         for value in self.hydraulic.values:
             if not abs(value) <= 1e3:
                 raise InputError(f"{what}: P = {value!r} N/mm² is beyond ±1e3; 1 N/mm² = 1e6 Pa")
+        checks.flag(f"{what}: porous_plate", self.porous_plate)
         if self.treatment is not None:
             choices = "Penalty(...), Nitsche(), Multiplier(), Lagged(), Frozen(), Essential(), or a Weak or Prescribed one"
             checks.instance(f"{what}: treatment", self.treatment, Weak | Prescribed, choices)
@@ -74,6 +80,18 @@ class Bath:
     def schedules(self) -> tuple[Schedule, ...]:
         """Its histories."""
         return (self.hydraulic,) if self.salt is None else (self.salt, self.hydraulic)
+
+    def loads(
+        self, kinematics: Kinematics, u: CoefficientFunction, v: CoefficientFunction, fields: BathFields
+    ) -> list[Term]:
+        """The pressure on the body in the balance of total stress (16): +∫ P̄ Cof(F) N · v dA, which follows the surface.
+
+        Nothing where P̄ is 0 throughout, or where a porous plate carries it.
+        """
+        if self.porous_plate or not any(self.hydraulic.values):
+            return []
+        power = InnerProduct(kinematics.area_vector(u), v)
+        return [Term("momentum", "pressure of the bath", fields.P * power, role=Role.LOAD, boundary=self.boundary)]
 
     def check_in(self, surroundings: Surroundings) -> None:
         """Refuse boundaries that the mesh lacks, histories that its places do not allow, a treatment that does not suit."""

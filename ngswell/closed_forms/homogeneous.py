@@ -54,14 +54,14 @@ def homogeneous_equilibrium(
     """The state in which a homogeneous body comes to rest in a bath of `salt` [mol/l] at `hydraulic` [N/mm²].
 
     `motion` is "confined", "plane strain" or "3-d": d = 1, 2, 3 directions free to stretch by J^(1/d). Equilibrium of the
-    extra stress with the pore pressure (38) and an outer pressure `load` [N/mm²] on the deformed surface:
+    extra stress with the pore pressure (38) and what presses on the deformed surface, P̄ and a `load` [N/mm²]:
 
-        dψ/dJ = p_D(c̄, cfc) − load,   for the paper's law (18)
-        µ (J^(2/d) − 1) + λ (1 − nS0)² [J/(1 − nS0) − J/(J − nS0)] = J (p_D − load).
+        dψ/dJ = p_D(c̄, cfc) − P̄ − load,   for the paper's law (18)
+        µ (J^(2/d) − 1) + λ (1 − nS0)² [J/(1 − nS0) − J/(J − nS0)] = J (p_D − P̄ − load).
 
-    p_D has the material's Γ, φ and φ̄; with φ Γ > φ̄ a weak gel may swell without bound. `boundary_charge` [mol/l]
-    replaces cfc(J) in p_D: a boundary condition that does not follow the deformation.
-    Raises InputError for parameters that vary in space and where there is no equilibrium.
+    P̄ adds to p and leaves J; where a porous plate carries it, give load − P̄. p_D has the material's Γ, φ and φ̄; with
+    φ Γ > φ̄ a weak gel may swell without bound. `boundary_charge` [mol/l] replaces cfc(J) in p_D: a boundary condition that
+    does not follow the deformation. Raises InputError for parameters that vary in space, and without equilibrium.
     """
     checks.instance("material", material, Material, "a Material(...)")
     checks.choice("motion", motion, FREE_DIRECTIONS)
@@ -76,12 +76,12 @@ def homogeneous_equilibrium(
     def charge(content: float) -> float:
         return (1 - nS0) * cfc0 / content
 
-    def pressure(content: float) -> float:
+    def osmotic(content: float) -> float:
         cfc, m = charge(content) if boundary_charge is None else boundary_charge, material
-        return donnan.pressure(salt, cfc, m.RT, hydraulic, m.Gamma, m.phi, m.phi_bath)
+        return donnan.pressure(salt, cfc, m.RT, 0.0, m.Gamma, m.phi, m.phi_bath)
 
     def excess(content: float) -> float:
-        return response(content) - pressure(content) + load
+        return response(content) - osmotic(content) + load
 
     if excess(SMALLEST * nS0) > 0:
         raise InputError(
@@ -92,7 +92,7 @@ def homogeneous_equilibrium(
         raise InputError(f"no equilibrium: the body swells without bound in a bath of {salt:g} mol/l")
     J, cfc = nS0 + content, charge(content)
     c = donnan.cations(salt, cfc if boundary_charge is None else boundary_charge, material.Gamma)
-    return Equilibrium(J, cfc, nS0 / J, c, pressure(content))
+    return Equilibrium(J, cfc, nS0 / J, c, hydraulic + osmotic(content))
 
 
 def _root(function: Callable[[float], float], low: float, high: float) -> float | None:

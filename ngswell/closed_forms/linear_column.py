@@ -146,8 +146,9 @@ def uniform_gel_fluxes(
 class LinearColumn:
     """A confined column on a sealed, fixed bottom x = 0 in equilibrium with a `bath` [mol/l] on top, x = `height` [mm].
 
-    Its load holds the reference state and stays. Responses are to a sudden small change of the bath at t = 0; they take
-    `step` [s] to follow backward Euler with that step, 1/(1 + rate step)^k at t = k step in place of exp(−rate t).
+    Its load holds the reference state and stays: a porous plate carries P̄ (without, δP̄ adds to p alone).
+    Responses are to a sudden small change of the bath at t = 0; they take `step` [s] to follow backward Euler with that
+    step, 1/(1 + rate step)^k at t = k step in place of exp(−rate t).
     """
 
     material: Material

@@ -52,6 +52,7 @@ class Problem(Discretisation):
             *self.model.terms(trial_state, tests[:own]),
             *self._bath_terms(trial_state, trials, tests),
             *(term for load in setup.loads for term in load.terms(trial_state, tests[0], self.clock)),
+            *self._bath_loads(trial_state.u, tests[0]),
         ]
         self.admissible = Admissible(self, self.state)
         self._prescribed = PrescribedValues(self, self.fields, self.baths)
@@ -71,6 +72,11 @@ class Problem(Discretisation):
             h = cell_size(self.mesh, bath.boundary)
             terms += treatment.terms(Contact(bath.boundary, state, excess, tested, multipliers, h))
         return terms
+
+    def _bath_loads(self, u: Any, v: Any) -> list[Term]:
+        """What baths press with."""
+        baths = self.setup.baths
+        return [term for bath in baths for term in bath.loads(self.kinematics, u, v, self.baths[bath.boundary])]
 
     # -- clock and states ----------------------------------------------------------------------------------------------
 

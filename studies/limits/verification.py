@@ -195,7 +195,9 @@ def cryer() -> Comparison:
         material=DRAINED,
         model=Uncharged(4),
         supports=[Roller("axis", "r"), Roller("bottom", "z")],
-        baths=[Bath("surface", P=-LOAD)],  # no load and suction: the loaded, drained sphere less a uniform pressure
+        baths=[
+            Bath("surface", P=-LOAD, porous_plate=True)
+        ],  # suction on the fluid alone: the loaded, drained sphere less a uniform pressure
         initial=(None, 0.0),
     )
     T, fine = np.arange(1, 21) * 0.02, np.linspace(0.002, 0.4, 200)

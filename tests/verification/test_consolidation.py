@@ -219,12 +219,12 @@ def test_terzaghi_in_space():
 
 
 def test_bath_below_the_load_is_the_load():
-    # Incompressible constituents: no load and a bath at −load, with p counted from there.
+    # Incompressible constituents: no load and suction at −load behind a porous plate, with p counted from there.
     scene, probes = terzaghi()
     loaded = histories(scene, probes, (0.02, 0.02), 0.2)
     sucked = Scene(
         mesh=column(1.0, 20), kinematics=Confined(), material=MATERIAL, model=Uncharged(3),
-        supports=[Roller("bottom", "x")], baths=[Bath("top", P=-LOAD)], initial=(None, 0.0),
+        supports=[Roller("bottom", "x")], baths=[Bath("top", P=-LOAD, porous_plate=True)], initial=(None, 0.0),
     )  # fmt: skip
     shifted = histories(sucked, probes, (0.02, 0.02), 0.2) + np.array([[1.0]] * 4 + [[0.0]])
     assert shifted == pytest.approx(loaded, abs=1e-6)  # Newton's tolerance over the load, finite strain
@@ -307,7 +307,7 @@ def cryer(refinements=1, order=4, kinematics=None):
     scene = Scene(
         mesh=mesh.Curve(order), kinematics=kinematics or Axisymmetric(), material=MATERIAL,
         model=Uncharged(order), supports=[Roller("axis", "r"), Roller("bottom", "z")],
-        baths=[Bath("surface", P=-LOAD)], initial=(None, 0.0),
+        baths=[Bath("surface", P=-LOAD, porous_plate=True)], initial=(None, 0.0),
     )  # fmt: skip
     places = ((0.0, 0.0), (0.0, 0.5), (0.125**0.5, 0.125**0.5), (0.5, 0.0))
     probes = [(place, "p", 0, LOAD) for place in places]

@@ -162,7 +162,7 @@ def test_steady_seepage_through_a_column_of_varying_permeability(law):
     material = replace(TABLE_1, cfc0=0.0, permeability=law)
 
     def J_at(p):
-        return homogeneous_equilibrium(material, 1.0, "confined", hydraulic=p).J
+        return homogeneous_equilibrium(material, 1.0, "confined", load=-p).J
 
     nodes, weights = np.polynomial.legendre.leggauss(30)
     pressures = 0.15 * (1 + nodes)

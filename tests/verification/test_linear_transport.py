@@ -57,7 +57,7 @@ def test_storage_is_the_slope_of_the_equilibria(material, bath):
     load = donnan.pressure(bath, float(material.cfc0), material.RT)
 
     def contents(salt, hydraulic):
-        rest = homogeneous_equilibrium(material, bath + salt, "confined", hydraulic, load)
+        rest = homogeneous_equilibrium(material, bath + salt, "confined", hydraulic, load - hydraulic)
         return np.array([rest.J, (rest.J - material.nS0) * rest.c])
 
     def slope(salt, hydraulic):
@@ -439,7 +439,7 @@ def steady_fluxes(material, bath, salt=0.0, hydraulic=0.0):
         model=Concentration(),
         supports=[Roller("bottom", "x")],
         baths=[
-            Bath("top", c=bath + salt / 2, P=hydraulic / 2, treatment=weak),
+            Bath("top", c=bath + salt / 2, P=hydraulic / 2, treatment=weak, porous_plate=True),
             Bath("bottom", c=bath - salt / 2, P=-hydraulic / 2, treatment=weak),
         ],
         loads=[Traction("top", (-load,))],

@@ -79,8 +79,8 @@ def test_uncharged_is_the_full_model_without_charge(motion, order, full):
 
 
 def disturbed_column(model, material, load=0.0, c=0.15, P=0.0, cells=20):
-    """A column of Table 1 in equilibrium, disturbed by a load or by its bath's concentration or pressure."""
-    baths = [Bath("top", c=c, P=P, treatment=WEAK)]
+    """A column of Table 1 in equilibrium, disturbed by a load or by its bath's concentration or pressure (on a plate)."""
+    baths = [Bath("top", c=c, P=P, treatment=WEAK, porous_plate=True)]
     loads = [Traction("top", (-donnan.pressure(0.15, material.cfc0, material.RT) - load,))]
     return confined_column(cells=cells, material=material, model=model, baths=baths, loads=loads)
 
@@ -177,15 +177,15 @@ def equilibrium(model, bath, kinematics):
     c = Ramp((0, 4.1), (100, bath))
     if kinematics == "confined":
         shape = {"mesh": column(0.5, 5), "kinematics": Confined(), "supports": [Roller("bottom", "x")]}
-        point = (0.25,)
+        point, wet = (0.25,), "top"
     else:
         supports = [Symmetry("left"), Symmetry("bottom")]
         shape = {"mesh": rectangle(0.5, 0.5, 2, 2), "kinematics": PlaneStrain(), "supports": supports}
-        point = (0.25, 0.25)
+        point, wet = (0.25, 0.25), "top|right"
     names = ("J", "p", "c_plus", "c_minus", "cfc", "nS", "fluid_potential")
     probe = Probe(point, *names)
     scene = Scene(
-        **shape, material=TABLE_2, model=model, baths=[Bath("top", c=c, P=0.01, treatment=WEAK)],
+        **shape, material=TABLE_2, model=model, baths=[Bath(wet, c=c, P=0.01, treatment=WEAK)],
         charge=Ramp((0, 0.0), (100, 1.0)),
     )  # fmt: skip
     scene.run(1e6, Adaptive(1e-2), [probe], newton=DampedNewton())
