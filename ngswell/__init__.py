@@ -19,7 +19,8 @@ from ngswell.baths.treatment import Prescribed, Weak
 from ngswell.calls import refusing
 from ngswell.errors import InputError, InstabilityError, NgswellError, OutputError, Reason, StepError
 from ngswell.mesh.gmsh import read_mesh
-from ngswell.mesh.shapes import box, check_mesh, column, from_occ, rectangle
+from ngswell.mesh.shapes import box, column, from_occ, rectangle
+from ngswell.mesh.soundness import check_mesh
 from ngswell.models.concentration import Concentration
 from ngswell.models.local_donnan import LocalDonnan
 from ngswell.models.potential import Potential

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 from ngswell import checks
 from ngswell.errors import InputError, place
-from ngswell.mesh.shapes import check_mesh, check_named, check_plane
+from ngswell.mesh.shapes import check_named, check_plane
+from ngswell.mesh.soundness import check_mesh
 
 _FRAME = {
     "triangle": [1, 2],

@@ -1,38 +1,67 @@
-"""The parts of a mesh that are not connected with each other."""
+"""How the cells of a mesh hang together: sides that two of them share, sides of one alone, and the parts of the body."""
 
 from __future__ import annotations
 
+from functools import cached_property
+from itertools import chain
+
 import numpy as np
-from ngsolve import Mesh
+from ngsolve import EDGE, FACE, VERTEX, VOL, Mesh, NodeId
 from numpy.typing import NDArray
 
 from ngswell.errors import InputError, place
 
 
-def connected_parts(mesh: Mesh) -> list[NDArray]:
-    """Numbers of the vertices of each part of a mesh that edges connect."""
-    ends = np.array([[vertex.nr for vertex in edge.vertices] for edge in mesh.edges])
-    label = np.arange(mesh.nv)
-    while True:
-        least = label[ends].min(axis=1)
-        if (label[ends] == least[:, None]).all():
-            return [np.flatnonzero(label == number) for number in np.unique(label)]
-        for side in ends.T:
-            np.minimum.at(label, side, least)
-        label = label[label]
+class Sides:
+    """The sides of the cells of a mesh: points in 1-d, edges in 2-d, faces in 3-d."""
+
+    def __init__(self, mesh: Mesh) -> None:
+        self.mesh = mesh
+        of_cell = [[facet.nr for facet in cell.facets] for cell in mesh.Elements(VOL)]
+        cells = np.repeat(np.arange(len(of_cell)), [len(numbers) for numbers in of_cell])
+        sides = np.fromiter(chain.from_iterable(of_cell), int)
+        order = np.argsort(sides, kind="stable")
+        times = np.bincount(sides)[sides[order]]
+        self.cells = len(of_cell)
+        self.neighbours = cells[order][times == 2].reshape(-1, 2)
+        """Pairs of cells that share a side."""
+        self.free = sides[order][times == 1]
+        """Numbers of the sides of one cell alone: the surface of the body, where the mesh is sound."""
+
+    @cached_property
+    def corners(self) -> list[list[int]]:
+        """Vertices of each free side."""
+        kind = {1: VERTEX, 2: EDGE, 3: FACE}[self.mesh.dim]
+        if kind is VERTEX:
+            return [[number] for number in self.free.tolist()]
+        return [[vertex.nr for vertex in self.mesh[NodeId(kind, number)].vertices] for number in self.free.tolist()]
+
+    @cached_property
+    def parts(self) -> list[NDArray]:
+        """Vertices of each part of the body that shared sides connect."""
+        label = np.arange(self.cells)
+        while True:
+            least = label[self.neighbours].min(axis=1)
+            if (label[self.neighbours] == least[:, None]).all():
+                break
+            for cells in self.neighbours.T:
+                np.minimum.at(label, cells, least)
+            label = label[label]
+        if not label.any():
+            return [np.arange(self.mesh.nv)]
+        found: dict[int, set[int]] = {}
+        for cell, number in zip(self.mesh.Elements(VOL), label.tolist(), strict=True):
+            found.setdefault(number, set()).update(vertex.nr for vertex in cell.vertices)
+        return [np.array(sorted(part)) for part in found.values()]
 
 
-def check_separate(places: NDArray, parts: list[NDArray]) -> None:
-    """Refuse parts that touch without sharing vertices: they would not know of each other."""
-    if len(parts) == 1:
-        return
-    size = float(np.ptp(places, axis=0).max())
-    seen: dict[tuple[int, ...], int] = {}
-    for index, part in enumerate(parts):
-        for number in part:
-            key = tuple(np.round(places[number] / (1e-9 * size)).astype(int).tolist())
-            if seen.setdefault(key, index) != index:
-                raise InputError(
-                    f"mesh: two parts that are not connected touch near {place(places[number])} mm: merge their vertices "
-                    "(Glue in netgen.occ, Coherence in Gmsh)"
-                )
+def check_hinges(mesh: Mesh, parts: list[NDArray]) -> None:
+    """Refuse parts that share a corner or an edge but no side: what holds there, and how far, only the mesh would say."""
+    numbers, times = np.unique(np.concatenate(parts), return_counts=True)
+    if (times > 1).any():
+        where = place(mesh[NodeId(VERTEX, int(numbers[np.argmax(times > 1)]))].point)
+        by = "a corner" if mesh.dim == 2 else "a corner or an edge"
+        raise InputError(
+            f"mesh: two parts of the body hang together near {where} mm by {by} alone, as by a hinge: join them along whole "
+            "sides of cells, or keep them apart"
+        )

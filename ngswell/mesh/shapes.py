@@ -1,4 +1,4 @@
-"""Meshes with named boundaries: structured and graded, from CAD shapes; and the check that their cells are sound."""
+"""Meshes with named boundaries: structured and graded, from CAD shapes."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 from netgen.occ import OCCGeometry, TopoDS_Shape
-from ngsolve import ET, VOL, ElementId, IntegrationRule, Mesh, specialcf
+from ngsolve import Mesh
 from ngsolve.meshes import Make1DMesh, MakeStructured2DMesh, MakeStructured3DMesh
 from numpy.typing import NDArray
 
 from ngswell import checks
-from ngswell.errors import InputError, place
-from ngswell.mesh.points import with_corners
+from ngswell.errors import InputError
+from ngswell.mesh.soundness import check_mesh
 
 Grade = dict[str, float]
 """Boundary name → how many times thinner the cell at that boundary is than the largest of its row [-]."""
@@ -24,12 +24,6 @@ SIZES = (1e-6, 1e6)
 
 MOST_CELLS = 10**7
 """Cells that a mesh may have."""
-
-_CELLS = {
-    1: {"segment": ET.SEGM},
-    2: {"triangle": ET.TRIG, "quadrilateral": ET.QUAD},
-    3: {"tetrahedron": ET.TET, "hexahedron": ET.HEX, "prism": ET.PRISM, "pyramid": ET.PYRAMID},
-}
 
 
 def column(height: float, cells: int, grade: Grade | None = None) -> Mesh:
@@ -141,37 +135,6 @@ def from_occ(shape: Any, maxh: float, order: int = 1, quads: bool = False) -> Me
     mesh.Curve(order)
     check_mesh(mesh)
     return mesh
-
-
-def check_mesh(mesh: Mesh) -> None:
-    """Refuse cells that are turned inside out or have no size, by number and place.
-
-    At the corners and the integration points of degree 4 the determinant of the cell's mapping has to have the sign it has
-    in most cells of the same shape (which one depends on how the mesh generator numbers the corners), and the thickness,
-    determinant over largest stretch to the power d − 1, has to be above round-off of the body's size. The determinant of a
-    straight quadrilateral is linear, so that its corners decide: their angles have to stay below 180°.
-    """
-    round_off = 1e-12 * float(np.ptp(mesh.ngmesh.Coordinates(), axis=0).max())
-    for name, shape in _CELLS[mesh.dim].items():
-        where = mesh.MapToAllElements({shape: with_corners(shape, 4)}, VOL)
-        if not len(where):
-            continue
-        mapping = specialcf.JacobianMatrix(mesh.dim)(where).reshape(-1, mesh.dim, mesh.dim)
-        det = np.linalg.det(mapping)
-        stretch = np.linalg.norm(mapping, axis=1).max(axis=1)
-        thickness = np.sign(np.median(det)) * det / np.maximum(stretch, round_off) ** (mesh.dim - 1)
-        bad = np.unique(where["nr"][~(thickness > round_off)])
-        if len(bad):
-            found = thickness[where["nr"] == bad[0]]
-            fault = "is turned inside out" if found.min() < -round_off else "has no size"
-            if (found[: len(IntegrationRule(shape, 4))] > round_off).all():
-                fault = "has a corner of 180° or more"
-            vertices = [mesh[vertex].point for vertex in mesh[ElementId(VOL, int(bad[0]))].vertices]
-            where = place(np.mean(vertices, axis=0))
-            raise InputError(
-                f"mesh: cell {bad[0]}, a {name} near {where} mm, {fault}"
-                f"{f', as {len(bad) - 1} more' if len(bad) > 1 else ''}: move its corners, or mesh the body again"
-            )
 
 
 def check_named(what: str, names: Iterable[str], remedy: str) -> None:

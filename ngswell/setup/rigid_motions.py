@@ -7,21 +7,24 @@ from ngsolve import LinearForm, Mesh, Trace, dx
 from numpy.typing import NDArray
 
 from ngswell.errors import InputError, place
-from ngswell.mesh.parts import check_separate, connected_parts
 from ngswell.mesh.points import vertices, vertices_of
 from ngswell.physics.kinematics import Kinematics
 
 
 def check_determined(
-    mesh: Mesh, kinematics: Kinematics, fixed: dict[str, str], pins: list[tuple[int, str]], wet: set[int]
+    mesh: Mesh,
+    bodies: list[NDArray],
+    kinematics: Kinematics,
+    fixed: dict[str, str],
+    pins: list[tuple[int, str]],
+    wet: set[int],
 ) -> None:
     """Refuse parts of the body that are free to translate or rotate, or whose pressure has no level.
 
-    `fixed` are the boundaries on which each displacement component vanishes, `pins` pairs (vertex, direction), `wet` the
-    vertices on baths.
+    `bodies` are the vertices of each part, `fixed` the boundaries on which each displacement component vanishes, `pins`
+    pairs (vertex, direction), `wet` the vertices on baths.
     """
-    places, bodies = vertices(mesh), connected_parts(mesh)
-    check_separate(places, bodies)
+    places = vertices(mesh)
     fixed_pairs = {
         (number, axis)
         for axis, direction in enumerate(kinematics.directions)

@@ -12,8 +12,9 @@ from ngswell import checks
 from ngswell.baths.bath import Bath, checked_salt, default_treatment
 from ngswell.baths.treatment import Prescribed, Treatment, Weak
 from ngswell.errors import InputError
+from ngswell.mesh.parts import Sides
 from ngswell.mesh.points import vertices_of
-from ngswell.mesh.shapes import check_mesh
+from ngswell.mesh.soundness import check_cells, check_sides
 from ngswell.models.model import Model
 from ngswell.models.potential import Potential
 from ngswell.physics.kinematics import Kinematics
@@ -50,7 +51,9 @@ class Setup:
             raise InputError(
                 f"{type(self.kinematics).__name__} needs a {self.kinematics.dimension}-d mesh, this one is {self.mesh.dim}-d"
             )
-        check_mesh(self.mesh)
+        check_cells(self.mesh)
+        sides = Sides(self.mesh)
+        check_sides(sides)
         self.material.check_on(self.mesh)
         self.model.check(self.material, self.baths)
         for value in self.charge.values:
@@ -61,7 +64,7 @@ class Setup:
             support.check_in(self)
         self.kinematics.check(self.mesh, self.fixed())
         wet = {number for bath in self.baths for number in vertices_of(self.mesh, bath.boundary)}
-        check_determined(self.mesh, self.kinematics, self.fixed(), self.pins(), wet)
+        check_determined(self.mesh, sides.parts, self.kinematics, self.fixed(), self.pins(), wet)
         for load in self.loads:
             load.check_in(self)
         self.initial_bath()  # refuses baths that differ at the start

@@ -28,7 +28,7 @@ from ngswell import (
 )
 from ngswell.analysis.diagnosis import imbalance, singular_mode
 from ngswell.errors import Reason
-from ngswell.mesh.parts import connected_parts
+from ngswell.mesh.parts import Sides
 from ngswell.mesh.points import corners, points
 from tests.scenes import P0, UNCHARGED, confined_column, strip
 
@@ -67,7 +67,7 @@ def gel(mesh, supports, baths):
 
 def test_a_part_that_nothing_holds_is_named():
     mesh = two_squares(0.5)
-    assert sorted(len(part) for part in connected_parts(mesh)) == [9, 9]
+    assert sorted(len(part) for part in Sides(mesh).parts) == [9, 9]
     baths = [Bath("bottom|top", c=0.15)]
     with pytest.raises(InputError, match=r"part near \(0.5, 1.\d+\) mm, one of 2 not connected, can rotate"):
         gel(mesh, [Roller("bottom", "xy")], baths)
@@ -84,7 +84,7 @@ def test_a_part_that_nothing_holds_is_named():
 
 def test_parts_that_touch_without_sharing_vertices_are_refused():
     supports, baths = [Roller("bottom|top", "xy")], [Bath("bottom|top", c=0.15)]
-    with pytest.raises(InputError, match=r"two parts that are not connected touch near .* merge their vertices"):
+    with pytest.raises(InputError, match=r"touch near .* without sharing a side.* merge the vertices"):
         gel(two_squares(0.0), supports, baths)
     gel(two_squares(0.0, glue=True), supports, baths)
 
@@ -103,7 +103,7 @@ def test_other_motions_without_change_of_volume_are_refused():
         confined_column(baths=[], loads=[], supports=[Roller("bottom|top", "x")], initial=(0.15, 0.0))
     with pytest.raises(InputError, match="level"):
         sealed("Uncharged", kinematics=Axisymmetric(), supports=[Roller("left|right", "r"), Roller("bottom|top", "z")])
-    assert column(1.0, 3).nv == len(connected_parts(column(1.0, 3))[0])
+    assert column(1.0, 3).nv == len(Sides(column(1.0, 3)).parts[0])
 
 
 @pytest.mark.parametrize(
