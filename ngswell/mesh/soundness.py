@@ -76,6 +76,8 @@ def check_sides(sides: Sides) -> None:
     _check_shapes(sides.mesh)
     surface = _Surface(sides)
     for simplices, points in _candidates(surface.low, surface.high, surface.points):
+        others = ~surface.own(simplices, points)
+        simplices, points = simplices[others], points[others]
         touching = surface.touching(simplices, points)
         if touching.any():
             first = int(np.argmax(touching))
@@ -86,7 +88,7 @@ def check_sides(sides: Sides) -> None:
 def _check_shapes(mesh: Mesh) -> None:
     """Refuse triangles on quadrilaterals that have their corners: NGSolve takes one of them for the whole side."""
     corners = {ET.PRISM: 18, ET.PYRAMID: 16, ET.HEX: 24, ET.TET: 12}  # of all sides of a cell
-    if mesh.dim < 3 or {cell.type for cell in mesh.Elements(VOL)} <= {ET.TET}:
+    if mesh.dim < 3 or (len(types := {cell.type for cell in mesh.Elements(VOL)}) == 1 and types <= {ET.TET, ET.HEX}):
         return
     of_side = [len(face.vertices) for face in mesh.faces]
     for cell in mesh.Elements(VOL):
@@ -133,8 +135,13 @@ class _Surface:
         lengths = [float(np.linalg.norm(a - b)) for a, b in combinations(places, 2)]
         return max(round_off / _TOUCHING, min(lengths, default=0.0))
 
+    def own(self, simplices: NDArray, points: NDArray) -> NDArray:
+        """Whether each point is a corner or the middle of the simplex' side."""
+        side = self.side[simplices]
+        return (self.corners[side] == points[:, None]).any(axis=1) | (points == self.vertices + side)
+
     def touching(self, simplices: NDArray, points: NDArray) -> NDArray:
-        """Whether each point lies on the simplex beside it, of another side than its own."""
+        """Whether each point lies on the simplex beside it."""
         corners, where = self.points[self.simplices[simplices]], self.points[points]
         edges = np.moveaxis(corners[:, 1:] - corners[:, :1], 1, 2)
         offset = (where - corners[:, 0])[..., None]
@@ -143,9 +150,7 @@ class _Surface:
         side = self.side[simplices]
         reach = _TOUCHING * np.minimum(self.side_sizes[side], self.sizes[points])
         beyond = (local.sum(axis=1) - 1) * lengths.max(axis=1, initial=0.0)
-        inside = (local * lengths >= -reach[:, None]).all(axis=1) & (beyond <= reach) & (distance <= reach)
-        own = (self.corners[side] == points[:, None]).any(axis=1) | (points == self.vertices + side)
-        return inside & ~own
+        return (local * lengths >= -reach[:, None]).all(axis=1) & (beyond <= reach) & (distance <= reach)
 
     def fault(self, simplex: int, point: int) -> str:
         """What is wrong where a point lies on a simplex."""
