@@ -26,9 +26,14 @@ from ngswell.stepping.steps import Control
 class Scene(Setup):
     __doc__ = Setup.__doc__
 
-    @cached_property
+    @property
     def problem(self) -> Problem:
         """A discrete problem of the scene to look into: spaces, terms, forms. Runs make their own and leave it as it is."""
+        self.mesh_shape.check(self.mesh)
+        return self._problem
+
+    @cached_property
+    def _problem(self) -> Problem:
         return Problem(self)
 
     def state(self, snapshot: Snapshot) -> Any:

@@ -29,9 +29,13 @@ class Snapshot:
 
 
 class Discretisation:
-    """The unknowns of a setup. No field: two states of one setup have the same discretisation."""
+    """The unknowns of a setup. No field: two states of one setup have the same discretisation.
+
+    Raises InputError where the mesh has changed since the setup was made.
+    """
 
     def __init__(self, setup: Setup) -> None:
+        setup.mesh_shape.check(setup.mesh)
         self.setup = setup
         self.mesh, self.model, self.kinematics = setup.mesh, setup.model, setup.kinematics
         prescribed = "|".join(bath.boundary for bath, _ in setup.prescribed_baths)

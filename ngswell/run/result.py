@@ -22,9 +22,17 @@ class Result:
     factorisations: int
     solves: int
 
-    @cached_property
+    @property
     def state(self) -> Any:
-        """The model's state at the end: fields and outputs, `result.state.at((1.1, 0.5), "J")`. No later run changes it."""
+        """The model's state at the end: fields and outputs, `result.state.at((1.1, 0.5), "J")`. No later run changes it.
+
+        Raises InputError where the mesh has changed since the scene was made: fields do not follow it.
+        """
+        self.setup.mesh_shape.check(self.setup.mesh)
+        return self._state
+
+    @cached_property
+    def _state(self) -> Any:
         return Discretisation(self.setup).state_at(self.end)
 
     @property

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from ngsolve import CoefficientFunction, Mesh
 
@@ -14,6 +14,7 @@ from ngswell.baths.treatment import Prescribed, Treatment, Weak
 from ngswell.errors import InputError
 from ngswell.mesh.parts import Sides
 from ngswell.mesh.points import vertices_of
+from ngswell.mesh.shape import MeshShape
 from ngswell.mesh.soundness import check_cells, check_sides
 from ngswell.models.model import Model
 from ngswell.models.potential import Potential
@@ -44,6 +45,7 @@ class Setup:
     charge: Ramp = Ramp((0.0, 1.0))
     start: float = 0.0  # [s]
     initial: tuple[float | None, float] | None = None
+    mesh_shape: MeshShape = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         self._check_kinds()
@@ -51,6 +53,7 @@ class Setup:
             raise InputError(
                 f"{type(self.kinematics).__name__} needs a {self.kinematics.dimension}-d mesh, this one is {self.mesh.dim}-d"
             )
+        checks.set_fields(self, mesh_shape=MeshShape.of(self.mesh))
         check_cells(self.mesh)
         sides = Sides(self.mesh)
         check_sides(sides)
