@@ -25,6 +25,11 @@ def points(mesh: Mesh, region: object = VOL, order: int = 4) -> NDArray:
     return mesh.MapToAllElements({shape: IntegrationRule(shape, order) for shape in _SHAPES}, region)
 
 
+def points_and_corners(mesh: Mesh, region: object, order: int) -> NDArray:
+    """The same, and the corners of the elements."""
+    return mesh.MapToAllElements({shape: with_corners(shape, order) for shape in _CORNERS}, region)
+
+
 def with_corners(shape: ET, order: int) -> IntegrationRule:
     """The integration rule of degree `order` on a cell, and its corners with no weight."""
     rule, corners = IntegrationRule(shape, order), _CORNERS[shape]

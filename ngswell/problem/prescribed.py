@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ngswell.baths.boundary import BathBoundary
 from ngswell.baths.treatment import Charge, PrescribedBoundary
 from ngswell.models.model import BathFields
+from ngswell.problem.bounded import set_bounded
 from ngswell.problem.discretisation import Discretisation
 
 
@@ -47,7 +48,11 @@ class PrescribedValues:
             for name, value in treatment.values(on).items():
                 component = self._fields.components[self._discretisation.names.index(name)]
                 on_boundary = GridFunction(component.space)
-                on_boundary.Set(value, definedon=self._discretisation.mesh.Boundaries(bath.boundary))
+                region = self._discretisation.mesh.Boundaries(bath.boundary)
+                if all(history.uniform for history in bath.schedules):
+                    on_boundary.Set(value, definedon=region)
+                else:
+                    set_bounded(on_boundary, value, region)
                 dofs = self._dofs[name, bath.boundary]
                 start = self._discretisation.ranges[name].start
                 self._pairs.append((start + dofs, on_boundary.vec.FV().NumPy()[dofs]))

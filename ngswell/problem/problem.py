@@ -5,13 +5,14 @@ from __future__ import annotations
 from functools import cached_property
 from typing import Any
 
-from ngsolve import CF, BaseMatrix, BaseVector, BilinearForm, GridFunction, Parameter
+from ngsolve import CF, BaseMatrix, BaseVector, BilinearForm, CoefficientFunction, GridFunction, Parameter
 from numpy.typing import NDArray
 
 from ngswell.baths.treatment import Charge, Contact
 from ngswell.models.model import BathFields, FieldContext
 from ngswell.models.term import Kind, Term
 from ngswell.problem.admissible import Admissible
+from ngswell.problem.bounded import set_bounded
 from ngswell.problem.discretisation import Discretisation, Snapshot
 from ngswell.problem.forms import cell_size, form
 from ngswell.problem.prescribed import PrescribedValues
@@ -105,8 +106,10 @@ class Problem(Discretisation):
         if self.model.charge_field is not None:
             values[self.model.charge_field] = cfc
         self.fields.vec[:] = 0.0
+        uniform = not any(isinstance(value, CoefficientFunction) for value in (salt, hydraulic))
         for name, value in values.items():
-            self.fields.components[self.names.index(name)].Set(value)
+            field = self.fields.components[self.names.index(name)]
+            field.Set(value) if uniform else set_bounded(field, value)
         self._prescribed.remember(Charge.START)
         self.initial = self.vector.copy()
 
