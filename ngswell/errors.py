@@ -20,6 +20,10 @@ class OutputError(NgswellError, OSError):
     """A result that cannot be written where it was asked for."""
 
 
+class OverlapWarning(UserWarning):
+    """A state in which the body overlaps itself."""
+
+
 class Reason(Enum):
     """Why an attempt at a step, or a state of rest, was given up; the value says it in words."""
 

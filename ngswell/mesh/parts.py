@@ -27,6 +27,8 @@ class Sides:
         """Pairs of cells that share a side."""
         self.free = sides[order][times == 1]
         """Numbers of the sides of one cell alone: the surface of the body, where the mesh is sound."""
+        self.behind = cells[order][times == 1]
+        """The cell of each of them."""
 
     @cached_property
     def corners(self) -> list[list[int]]:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from ngswell import checks
 from ngswell.analysis.diagnosis import folded, singular_mode
+from ngswell.analysis.overlap import warn_of_overlap
 from ngswell.baths.treatment import Charge
 from ngswell.errors import UNCONVERGED, Failure, InputError, Reason, StepError
 from ngswell.observers.base import Observer
@@ -65,7 +66,9 @@ def equilibrate(
     problem.set_time(time)
     with watch:
         watch.start(problem, time, time, time)
-    return problem.snapshot(time)
+    rested = problem.snapshot(time)
+    warn_of_overlap(problem, rested)
+    return rested
 
 
 class _Rest:

@@ -12,6 +12,7 @@ from threadpoolctl import threadpool_limits
 
 from ngswell import checks
 from ngswell.analysis.diagnosis import explain
+from ngswell.analysis.overlap import warn_of_overlap
 from ngswell.baths.treatment import Charge
 from ngswell.errors import InputError, StepError
 from ngswell.observers.base import Observer
@@ -78,6 +79,7 @@ def run(
         else:
             if checkpoint:
                 checkpoint.save(log.restart)
+    warn_of_overlap(problem, stepper.accepted)
     signals.end(stepper.accepted.time, checkpoint.path if checkpoint else None)
     return log.result(setup)
 

@@ -1,0 +1,78 @@
+"""A body that covers a place twice is reported, with the place; one that comes close is not."""
+
+import warnings
+from math import pi
+
+import pytest
+from ngsolve import CF, cos, sin, x, y, z
+
+from ngswell import (
+    TABLE_1,
+    Bath,
+    Fixed,
+    LocalDonnan,
+    OverlapWarning,
+    PlaneStrain,
+    Roller,
+    Scene,
+    Spatial,
+    box,
+    rectangle,
+)
+from ngswell.analysis.overlap import overlap, warn_of_overlap
+from ngswell.problem.problem import Problem
+from tests.scenes import confined_column, quarter
+
+LENGTH, HEIGHT = 6.0, 0.4  # mm
+
+
+def curled(turns, space=False, cells=48, pitch=0.0):
+    """A strip bent to `turns` of a circle, its radius growing by `pitch` [mm] a turn, and its problem."""
+    if space:
+        mesh = box(LENGTH, HEIGHT, 0.5, cells, 2, 1, "prisms")
+        kinematics, held = Spatial(), "xyz"
+    else:
+        mesh, kinematics, held = rectangle(LENGTH, HEIGHT, cells, 2), PlaneStrain(), "xy"
+    scene = Scene(
+        mesh=mesh, kinematics=kinematics, material=TABLE_1, model=LocalDonnan(), supports=[Roller("left", held)],
+        baths=[Bath("top", c=0.15)],
+    )  # fmt: skip
+    problem = Problem(scene)
+    problem.initialise()
+    angle = 2 * pi * turns * x / LENGTH
+    radius = LENGTH / (2 * pi * turns) + pitch * angle / (2 * pi) - y
+    bent = (radius * sin(angle) - x, LENGTH / (2 * pi * turns) - radius * cos(angle) - y)
+    problem.fields.components[0].Set(CF((*bent, 0 * z) if space else bent))
+    return problem
+
+
+@pytest.mark.parametrize("space", [False, True])
+def test_a_strip_that_curls_into_itself_is_named(space):
+    problem = curled(1.13, space)
+    found = overlap(problem, problem.snapshot(0.0))
+    # Its first and last 0.13 of 1.13 turns lie on each other: cells of two rows (and two triangles in space) at either end.
+    covered = 2 * round(48 * 0.13 / 1.13) * 2 * (2 if space else 1)
+    assert abs(found.cells - covered) <= 8
+    along = found.where[0]
+    assert min(along, LENGTH - along) < LENGTH * 0.13 / 1.13
+    with pytest.warns(OverlapWarning, match=r"overlaps itself: \d+ of \d+ cells .* Contact is not modelled.* Remedies: "):
+        warn_of_overlap(problem, problem.snapshot(0.0))
+
+
+@pytest.mark.parametrize("space", [False, True])
+@pytest.mark.parametrize(("turns", "pitch"), [(0.98, 0.0), (1.6, 0.5), (0.0001, 0.0)])
+def test_a_strip_that_comes_close_is_not(turns, pitch, space):
+    # A gap of 0.12 mm, or a spiral with gaps of 0.1 mm, in a body of 0.4 mm.
+    problem = curled(turns, space, cells=24, pitch=pitch)
+    assert overlap(problem, problem.snapshot(0.0)) is None
+
+
+def test_swollen_bodies_do_not_overlap():
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", OverlapWarning)
+        quarter(c=2.0).equilibrate()
+        confined_column(cells=2).run(1.0, Fixed(1.0))
+
+
+def test_a_bilayer_that_curls_into_itself_says_so_at_the_end():
+    """The rim that swells is outside: a strip of 5 × 0.1 mm bends to more than a circle."""
