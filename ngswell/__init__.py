@@ -17,7 +17,16 @@ from ngswell.baths.penalty import Penalty
 from ngswell.baths.prescribed import Essential, Frozen
 from ngswell.baths.treatment import Prescribed, Weak
 from ngswell.calls import refusing
-from ngswell.errors import InputError, InstabilityError, NgswellError, OutputError, OverlapWarning, Reason, StepError
+from ngswell.errors import (
+    InputError,
+    InstabilityError,
+    InstabilityWarning,
+    NgswellError,
+    OutputError,
+    OverlapWarning,
+    Reason,
+    StepError,
+)
 from ngswell.mesh.gmsh import read_mesh
 from ngswell.mesh.shapes import box, column, from_occ, rectangle
 from ngswell.mesh.soundness import check_mesh
@@ -57,13 +66,13 @@ from ngswell.version import __version__ as __version__
 __all__ = [
     "BACKWARD_EULER", "ESDIRK4", "TABLE_1", "TABLE_2", "VTK", "Adaptive", "Area", "Averaged", "Axisymmetric", "Bath",
     "Blend", "Call", "Checkpoint", "Coarseness", "Concentration", "Confined", "DampedNewton", "Essential", "Fixed",
-    "Frozen", "HolmesMow", "InnerLayer", "InputError", "InstabilityError", "Integral", "Lagged", "LeastSquares",
-    "Ledger", "Load", "LocalDonnan", "MackieMeares", "Material", "Multiplier", "NeoHookean", "NgswellError", "Nitsche",
-    "Observer", "OutputError", "OverlapWarning", "Penalty", "Pin", "PlaneStrain", "Potential", "PowerLaw",
-    "Prescribed", "Probe", "Problem", "Progress", "Ramp", "Reason", "Restart", "Result", "Role", "Roller", "Scene",
-    "Setup", "Snapshot", "Snapshots", "Spatial", "Stability", "StepError", "Support", "Symmetry", "Term", "Traction",
-    "TwoLevelSolver", "Uncharged", "Weak", "Weight", "box", "check_mesh", "column", "from_occ", "read_checkpoint",
-    "read_mesh", "rectangle",
+    "Frozen", "HolmesMow", "InnerLayer", "InputError", "InstabilityError", "InstabilityWarning", "Integral", "Lagged",
+    "LeastSquares", "Ledger", "Load", "LocalDonnan", "MackieMeares", "Material", "Multiplier", "NeoHookean",
+    "NgswellError", "Nitsche", "Observer", "OutputError", "OverlapWarning", "Penalty", "Pin", "PlaneStrain",
+    "Potential", "PowerLaw", "Prescribed", "Probe", "Problem", "Progress", "Ramp", "Reason", "Restart", "Result",
+    "Role", "Roller", "Scene", "Setup", "Snapshot", "Snapshots", "Spatial", "Stability", "StepError", "Support",
+    "Symmetry", "Term", "Traction", "TwoLevelSolver", "Uncharged", "Weak", "Weight", "box", "check_mesh", "column",
+    "from_occ", "read_checkpoint", "read_mesh", "rectangle",
 ]  # fmt: skip
 
 for _name in __all__:

@@ -24,6 +24,10 @@ class OverlapWarning(UserWarning):
     """A state in which the body overlaps itself."""
 
 
+class InstabilityWarning(UserWarning):
+    """A run or a state of rest is past the limit of stability: perturbations grow that the numbers do not show."""
+
+
 class Reason(Enum):
     """Why an attempt at a step, or a state of rest, was given up; the value says it in words."""
 
@@ -155,7 +159,8 @@ class StepError(NgswellError, RuntimeError):
 class InstabilityError(StepError):
     """The state reached is unstable, or its growth is not followed by the steps.
 
-    Beside those of StepError, attributes: `rate` of growth [1/s] (infinite: without flow), `wavelength` [mm] of the mode.
+    Beside those of StepError, attributes: `rate` of growth [1/s] (infinite: without flow), `wavelength` [mm] of the mode,
+    `said`, what is unstable and how.
     """
 
     def __init__(
@@ -163,10 +168,11 @@ class InstabilityError(StepError):
     ) -> None:
         self.time, self.step, self.rate, self.wavelength = time, step, rate, wavelength
         self.failure, self.cause = Failure(Reason.UNSTABLE, "u", where, what), None
-        said = f"the state at t = {time:.10g} s is unstable: {what}."
+        self.said = f"the state at t = {time:.10g} s is unstable: {what}."
         if lost:
-            said += f" Stages of {step:.3g} s do not follow that."
-        RuntimeError.__init__(self, f"{said} The last accepted state is that at t = {time:.10g} s. {self.failure.remedy}")
+            self.said += f" Stages of {step:.3g} s do not follow that."
+        last = f"The last accepted state is that at t = {time:.10g} s."
+        RuntimeError.__init__(self, f"{self.said} {last} {self.failure.remedy}")
 
 
 @dataclass(frozen=True)

@@ -67,12 +67,14 @@ class Scene(Setup):
         solver: Callable[[Problem], LinearSolver] = solver_of,
         newton: DampedNewton | None = None,
         observers: Sequence[Observer | Callable[[float, Any], object]] = (),
+        unstable: str = "warn",
     ) -> Snapshot:
         """The state of rest for the charge and baths at `time` [s] (the start), without a transient.
 
-        `observers` record it. What is done, and what cannot be: `ngswell.run.equilibrium.equilibrate`.
+        `observers` record it. A state in which anything grows, however slowly, is answered as in `run` (`unstable`).
+        What is done, and what cannot be: `ngswell.run.equilibrium.equilibrate`.
         """
-        return equilibrate(self, time, newton, solver, observers)
+        return equilibrate(self, time, newton, solver, observers, unstable)
 
     def growth_factor(
         self, dt: float, state: Snapshot | None = None, tolerance: float = 1e-6, most_steps: int = 1000
@@ -89,6 +91,7 @@ class Scene(Setup):
         resume: Snapshot | Restart | None = None,
         solver: Callable[[Problem], LinearSolver] = solver_of,
         checkpoint: Checkpoint | None = None,
+        unstable: str = "warn",
     ) -> Result:
         """Run to `until` [s] from the start, or from the snapshot `resume` of an earlier run of this scene.
 
@@ -100,8 +103,13 @@ class Scene(Setup):
         `solver` makes the linear solver: a direct one, or `TwoLevelSolver` for large bodies in space. `steps` are
         `Adaptive(tolerance)` or `Fixed(step)`, `newton` replaces the nonlinear solver that they ask for.
 
+        A state past the limit of stability is answered by an InstabilityWarning, with `unstable="error"` by an
+        InstabilityError, with "off" not at all: at the end where a perturbation grows by a factor e in as long as the run
+        took, now and then before where one grows faster than the steps follow. `Stability` among the observers looks in its
+        place, at every step.
+
         Raises InputError before any computing, OutputError when an observer cannot write, and StepError when no step
         succeeds; `end` of that error is the last accepted state. With a checkpoint, Ctrl-C and SIGTERM end the run after
         the present step.
         """
-        return run(self, until, steps, observers, newton, resume, solver, checkpoint)
+        return run(self, until, steps, observers, newton, resume, solver, checkpoint, unstable)

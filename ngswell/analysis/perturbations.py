@@ -7,7 +7,7 @@ from math import inf, pi
 from typing import Any
 
 import numpy as np
-from ngsolve import BilinearForm, Grad, GridFunction, InnerProduct, Integrate, Parameter, dx, sqrt
+from ngsolve import BilinearForm, Grad, GridFunction, InnerProduct, Integrate, dx, sqrt
 from numpy.typing import NDArray
 
 from ngswell.errors import NgswellError, place
@@ -18,6 +18,9 @@ from ngswell.solve.direct import CondensedSolver, LinearSolver
 
 SOLVES = 24
 """Krylov vectors in which a negative stiffness has to show."""
+
+GLANCE = 6
+"""Krylov vectors of a first look. In the unstable runs of studies/hard_cases a negative stiffness shows in three or four."""
 
 SETTLED = 0.5
 """A Ritz value counts as negative when what it may be off by is below this share of it."""
@@ -61,15 +64,18 @@ class Perturbations:
 
     That is exact at rest, where K is symmetric. Elsewhere it holds for rates above those at which the state itself changes.
     Growth in oscillations (complex s) is not looked for.
+
+    Forms and matrices are its own, so that looking changes nothing, unless a `solver` of the problem is given.
     """
 
-    def __init__(self, problem: Problem) -> None:
+    def __init__(self, problem: Problem, solver: LinearSolver | None = None) -> None:
         self.problem = problem
-        self._shift = Parameter(1.0)
-        whole = problem.reaches_inside
-        self._system = form(problem, problem.terms, self._shift, condense=not whole)
-        self._contents = form(problem, [term for term in problem.terms if term.kind is Kind.RATE])
-        self._solver = LinearSolver(problem.free) if whole else CondensedSolver(self._system, problem.free)
+        self._system: BilinearForm | None = None
+        if solver is None:
+            whole = problem.reaches_inside
+            self._system = form(problem, problem.terms, 1 / problem.dt, condense=not whole)
+            solver = LinearSolver(problem.free) if whole else CondensedSolver(self._system, problem.free)
+        self._solver = solver
         trial, test = problem.space.TnT()
         product = InnerProduct(Grad(trial[0]), Grad(test[0])) * problem.kinematics.weight
         self._size = BilinearForm(product * dx).Assemble().mat
@@ -77,27 +83,32 @@ class Perturbations:
         self._moving = np.zeros(problem.vector.size)
         self._moving[u] = np.array(list(problem.free), dtype=float)[u]
         self._vectors = [problem.fields.vec.CreateVector() for _ in range(2)]
+        self._values = [vector.FV().NumPy() for vector in self._vectors]
 
     def _factorise(self, rate: float) -> None:
         """Prepare solves with A + σ M at the present state, σ = `rate`."""
-        self._shift.Set(rate)
-        self._system.AssembleLinearization(self.problem.fields.vec)
-        if not self._solver.factorise(self._system.mat):
+        step = self.problem.dt.Get()
+        self.problem.dt.Set(1 / rate)
+        if self._system is None:
+            ready = self._solver.renew(self.problem)
+        else:
+            self._system.AssembleLinearization(self.problem.fields.vec)
+            ready = self._solver.factorise(self._system.mat)
+        self.problem.dt.Set(step)
+        if not ready:
             raise NgswellError(f"the linearised balances are singular or not finite for perturbations of rate {rate:g} 1/s")
 
     def _respond(self, force: NDArray) -> NDArray:
         """(A + σ M)⁻¹ force, all unknowns."""
-        right, response = self._vectors
-        right.FV().NumPy()[:] = force
-        if not self._solver.solve(right, response):
+        self._values[0][:] = force
+        if not self._solver.solve(*self._vectors):
             raise NgswellError("the response to a perturbation is not finite")
-        return response.FV().NumPy().copy()
+        return self._values[1].copy()
 
     def _product(self, matrix: Any, vector: NDArray) -> NDArray:
-        right, result = self._vectors
-        right.FV().NumPy()[:] = vector
-        result.data = matrix * right
-        return result.FV().NumPy().copy()
+        self._values[0][:] = vector
+        self._vectors[1].data = matrix * self._vectors[0]
+        return self._values[1].copy()
 
     def softest(self, rate: float) -> tuple[float, NDArray] | None:
         """Most negative eigenvalue κ found of K(σ) v = κ H v, σ = `rate`, and its v with all unknowns; None if none is.
@@ -107,35 +118,45 @@ class Perturbations:
         is symmetric and its Ritz values are bounds: one that is negative proves a negative eigenvalue.
         """
         self._factorise(rate)
-        V: list[NDArray] = []
-        images: list[NDArray] = []
-        responses: list[NDArray] = []
-        H = np.zeros((SOLVES + 1, SOLVES))
-        start = self._respond(np.random.default_rng(0).standard_normal(self._moving.size) * self._moving) * self._moving
-        image = self._product(self._size, start) * self._moving
-        length = sqrt(float(start @ image))
-        V.append(start / length)
-        images.append(image / length)
-        for j in range(SOLVES):
-            responses.append(self._respond(images[j]))
+        return self._negative(SOLVES, SETTLED)
+
+    def doubtful(self, rate: float | None = None) -> bool:
+        """Whether a first look at K(σ) shows a negative value, settled or not; `softest` tells whether it is one.
+
+        σ = `rate`, or that of the matrix that the given solver has factorised.
+        """
+        if rate is not None:
+            self._factorise(rate)
+        return self._negative(GLANCE, inf) is not None
+
+    def _negative(self, most: int, settled: float) -> tuple[float, NDArray] | None:
+        """The first negative Ritz value that may be off by no more than the share `settled`, within `most` vectors."""
+        V, images, responses = (np.empty((most + 1, self._moving.size)) for _ in range(3))
+        H = np.zeros((most + 1, most))
+        new = self._respond(np.random.default_rng(0).standard_normal(self._moving.size) * self._moving) * self._moving
+        image = self._product(self._size, new) * self._moving
+        length = sqrt(float(new @ image))
+        for j in range(most):
+            V[j], images[j] = new / length, image / length
+            responses[j] = self._respond(images[j])
             new = responses[j] * self._moving
             for _ in range(2):
-                along = np.array(images) @ new
+                along = images[: j + 1] @ new
                 H[: j + 1, j] += along
-                new -= along @ np.array(V)
+                new -= along @ V[: j + 1]
             image = self._product(self._size, new) * self._moving
-            H[j + 1, j] = sqrt(max(0.0, float(new @ image)))
+            H[j + 1, j] = length = sqrt(max(0.0, float(new @ image)))
+            exhausted = length <= 1e-13 * np.abs(H).max()
+            if settled == inf and not exhausted and j + 1 < most:
+                continue  # the last values are the lowest
             values, vectors = np.linalg.eig(H[: j + 1, : j + 1])
             first = int(np.argmin(values.real))
             value, vector = values[first], vectors[:, first]
-            left = abs(H[j + 1, j] * vector[-1]) / float(np.linalg.norm(vector))
-            exhausted = H[j + 1, j] <= 1e-13 * np.abs(H).max()
-            if value.real < 0 and (exhausted or left < -SETTLED * value.real):
-                return 1 / float(value.real), vector.real @ np.array(responses)
+            left = length * abs(vector[-1]) / float(np.linalg.norm(vector))
+            if value.real < 0 and (exhausted or left < -settled * value.real):
+                return 1 / float(value.real), vector.real @ responses[: j + 1]
             if exhausted:
                 return None
-            V.append(new / H[j + 1, j])
-            images.append(image / H[j + 1, j])
         return None
 
     def fastest(self, slowest: float, guess: float | None = None) -> Instability | None:
@@ -144,16 +165,17 @@ class Perturbations:
         found = self.softest(low)
         if found is None:
             return None
-        ratio = 10.0
+        ratio = 10.0  # of the next two rates, squared each time
         if guess is not None and guess / NEARBY > low:
             near = self.softest(guess / NEARBY)
             if near is not None:
                 low, found, ratio = guess / NEARBY, near, NEARBY**2
         high = low * ratio
         while (above := self.softest(high)) is not None:
+            if high > UNDRAINED:
+                return self._instability(inf, above[1])
+            ratio = min(ratio**2, 10 * UNDRAINED / high)
             low, found, high = high, above, high * ratio
-            if low > UNDRAINED:
-                return self._instability(inf, found[1])
         while high > NEARBY**2 * low:
             middle = sqrt(low * high)
             within = self.softest(middle)
@@ -166,11 +188,12 @@ class Perturbations:
     def _settled(self, low: float, high: float, mode: NDArray) -> Instability:
         """The rate s between `low` and `high`: (A + σ M)⁻¹ M v = v/(σ − s), by inverse iteration with shifts that follow."""
         scale = self.problem.sizes
-        self._contents.AssembleLinearization(self.problem.fields.vec)
+        contents = form(self.problem, [term for term in self.problem.terms if term.kind is Kind.RATE])
+        contents.AssembleLinearization(self.problem.fields.vec)
         shift = rate = low
         for _ in range(5):
             self._factorise(shift)
-            response = self._respond(self._product(self._contents.mat, mode))
+            response = self._respond(self._product(contents.mat, mode))
             scaled, old = response / scale, mode / scale
             inverse = float(scaled @ old / (old @ old))
             rate = shift - 1 / inverse

@@ -29,6 +29,9 @@ class Observer:
     A function of time [s] and state is an observer too: `observers=[lambda time, state: ...]`, see `Call`.
     """
 
+    watches_stability = False
+    """Whether it tells itself that a state is unstable; a run then does not look."""
+
     def __init__(self, when: float | Sequence[float] | None = None, *settings: object) -> None:
         self._when = When(type(self).__name__, when)
         self._settings = settings

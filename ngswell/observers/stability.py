@@ -38,6 +38,8 @@ class Stability(Observer):
     Raises InputError for `Lagged` baths, whose own instability is one of steps (`growth_factor`).
     """
 
+    watches_stability = True
+
     def __init__(self, when: float | Sequence[float] | None = None, follow: bool = False, over: float | None = None) -> None:
         super().__init__(when, follow, over)
         if over is not None and not over > 0:

@@ -15,6 +15,7 @@ from ngswell.errors import UNCONVERGED, Failure, InputError, Reason, StepError
 from ngswell.observers.base import Observer
 from ngswell.problem.discretisation import Snapshot
 from ngswell.problem.problem import Problem
+from ngswell.run.guard import Guard
 from ngswell.run.watch import Watch
 from ngswell.schedules import LARGEST
 from ngswell.setup.setup import Setup
@@ -41,6 +42,7 @@ def equilibrate(
     newton: DampedNewton | None = None,
     solver: Callable[[Problem], LinearSolver] = solver_of,
     observers: Sequence[Observer | Callable[[float, Any], object]] = (),
+    unstable: str = "warn",
 ) -> Snapshot:
     """The state in which the setup comes to rest when its charge and baths stay as they are at `time` [s] (its start).
 
@@ -51,6 +53,7 @@ def equilibrate(
     (what it holds is not determined by balances) and for treatments that remember the past, and StepError when neither way
     reaches the state of rest; `end` of the error is the initial state.
     """
+    Guard.check("equilibrate", unstable)
     time = setup.start if time is None else checks.number("equilibrate: time", time, "s", -LARGEST, LARGEST)
     if not setup.baths:
         raise InputError("equilibrate: the body is sealed, so its content at rest is not determined; give it a bath")
@@ -66,6 +69,7 @@ def equilibrate(
     problem.set_time(time)
     with watch:
         watch.start(problem, time, time, time)
+    Guard(unstable, watch, problem, rest.factorisation.solver, LONGEST).at_end(time)
     rested = problem.snapshot(time)
     warn_of_overlap(problem, rested)
     return rested

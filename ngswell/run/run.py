@@ -14,12 +14,13 @@ from ngswell import checks
 from ngswell.analysis.diagnosis import explain
 from ngswell.analysis.overlap import warn_of_overlap
 from ngswell.baths.treatment import Charge
-from ngswell.errors import InputError, StepError
+from ngswell.errors import InputError, InstabilityError, StepError
 from ngswell.observers.base import Observer
 from ngswell.problem.discretisation import Snapshot
 from ngswell.problem.problem import Problem
 from ngswell.run.checkpoint import Checkpoint
 from ngswell.run.digest import canonical_text, setup_digest
+from ngswell.run.guard import Guard
 from ngswell.run.restart import Restart, versions
 from ngswell.run.result import Result
 from ngswell.run.signals import Signals, Stopped
@@ -43,20 +44,20 @@ def run(
     resume: Snapshot | Restart | None = None,
     solver: Callable[[Problem], LinearSolver] = solver_of,
     checkpoint: Checkpoint | None = None,
+    unstable: str = "warn",
 ) -> Result:
     """The run that `Scene.run` describes."""
+    Guard.check("run", unstable)
     method = _Method.checked(setup, steps, newton, solver)
     watch = Watch(observers)
     start = _Start.checked(setup, until, resume, checkpoint, watch)
     method.check_first_step(start.begin, start.until)
-    stops = [*watch.plan(start.begin, start.until), *(checkpoint.plan(start.begin, start.until) if checkpoint else ())]
-    kinks = [kink for history in setup.schedules for kink in history.kinks]
-    timetable = Timetable.of(start.begin, start.until, kinks, stops)
-    problem = Problem(setup)
+    timetable, problem = start.timetable(setup, watch, checkpoint), Problem(setup)
     start.apply(problem)
     with TaskManager(), threadpool_limits(1, user_api="blas"), Signals(checkpoint is not None) as signals, watch:
         watch.start(problem, start.begin, start.time, start.until, start.remembered)
         stepper = method.stepper(problem, timetable, start.restart)
+        guard = Guard(unstable, watch, problem, stepper.factorisation.solver, timetable.duration)
         log = _Log(start, method, stepper, watch, setup_digest(setup) if checkpoint else {})
         if checkpoint:
             checkpoint.save(log.restart)
@@ -64,11 +65,12 @@ def run(
             for step in signals.until_received(stepper):
                 log.reports.append(step.report())
                 watch.observe(step)
+                guard.after_step(step.time)
                 if checkpoint:
                     checkpoint.after(step.time, log.restart)
         except BaseException as error:
             problem.restore(stepper.accepted)
-            if checkpoint and signals.stepping:  # observers agree with the last accepted step
+            if checkpoint and (signals.stepping or isinstance(error, InstabilityError)):  # observers agree on the last step
                 checkpoint.save(log.restart)
             if isinstance(error, Failed):
                 raise _step_error(error, problem, stepper) from None
@@ -79,6 +81,8 @@ def run(
         else:
             if checkpoint:
                 checkpoint.save(log.restart)
+            if signals.received is None:
+                guard.at_end(stepper.accepted.time)
     warn_of_overlap(problem, stepper.accepted)
     signals.end(stepper.accepted.time, checkpoint.path if checkpoint else None)
     return log.result(setup)
@@ -182,6 +186,12 @@ class _Start:
         if restart is not None:
             restart.check(setup, watch.observers)
         return cls(begin, time, until, snapshot, restart)
+
+    def timetable(self, setup: Setup, watch: Watch, checkpoint: Checkpoint | None) -> Timetable:
+        """What the steps have to land on."""
+        span = self.begin, self.until
+        stops = [*watch.plan(*span), *(checkpoint.plan(*span) if checkpoint else ())]
+        return Timetable.of(*span, [kink for history in setup.schedules for kink in history.kinks], stops)
 
     @property
     def remembered(self) -> tuple:

@@ -7,6 +7,7 @@ from types import TracebackType
 from typing import Any
 
 from ngswell import checks
+from ngswell.errors import InstabilityError
 from ngswell.files import Tree
 from ngswell.observers.base import Observer
 from ngswell.observers.call import Call
@@ -41,10 +42,16 @@ class Watch:
             self._started.append(observer)
 
     def observe(self, step: Step) -> None:
-        """Show every observer an accepted step."""
+        """Show every observer an accepted step; an unstable state is told when all have seen it, so that they agree."""
         assert self._problem is not None
+        unstable: InstabilityError | None = None
         for observer in self.observers:
-            observer.observe(self._problem, step)
+            try:
+                observer.observe(self._problem, step)
+            except InstabilityError as error:
+                unstable = unstable or error
+        if unstable is not None:
+            raise unstable
 
     def state(self) -> tuple[tuple[str, Tree], ...]:
         """What observers that take part in checkpoints remember, by their settings."""

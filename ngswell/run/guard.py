@@ -1,0 +1,100 @@
+"""Whether a run, or a state of rest, is past the limit of stability: a look that costs little."""
+
+from __future__ import annotations
+
+import warnings
+
+from ngswell import checks
+from ngswell.analysis.perturbations import Instability, Perturbations
+from ngswell.baths.treatment import Charge
+from ngswell.errors import InstabilityError, InstabilityWarning, NgswellError
+from ngswell.observers.stability import FOLLOWED
+from ngswell.problem.problem import Problem
+from ngswell.run.watch import Watch
+from ngswell.solve.direct import LinearSolver
+
+ANSWERS = ("warn", "error", "off")
+"""What a state past the limit of stability is answered with."""
+
+WORK = 400
+"""Solves between two looks during a run, one with a new matrix counted as `MATRIX` solves: a hundredth of the run's time."""
+
+MATRIX = 4
+
+CALLER = 5
+"""Frames from the warning to whoever called the method of a scene."""
+
+
+class Guard:
+    """Warns, or raises InstabilityError, where a perturbation grows.
+
+    Not for baths that look back one step, whose states have a map of their own, and where an observer watches stability.
+    """
+
+    def __init__(self, answer: str, watch: Watch, problem: Problem, solver: LinearSolver, duration: float) -> None:
+        looks_back = any(treatment.charge_of is Charge.LAST_STEP for _, treatment in problem.setup.prescribed_baths)
+        quiet = answer == "off" or looks_back or any(observer.watches_stability for observer in watch.observers)
+        self._answer = "off" if quiet else answer
+        self._problem, self._solver, self._slowest = problem, solver, 1 / duration
+        self._perturbations: Perturbations | None = None
+        self._next = self._work() + WORK
+
+    @staticmethod
+    def check(what: str, answer: str) -> None:
+        """Refuse an answer that is none."""
+        checks.choice(f"{what}: unstable =", answer, ANSWERS)
+
+    def _work(self) -> int:
+        return self._solver.solves + MATRIX * self._solver.factorisations
+
+    def after_step(self, time: float) -> None:
+        """Now and then during a run: whether growth is lost, faster than the stages just taken follow.
+
+        The matrix that the last step was solved with tells: K(σ) at σ of one over a stage.
+        """
+        if self._answer == "off" or self._work() < self._next or not self._solver.direct:
+            return
+        self._next = self._work() + WORK
+        solves = self._solver.solves  # the run's own
+        doubtful = self._doubtful(None)
+        self._solver.solves = solves
+        if doubtful:
+            found = _fastest(Perturbations(self._problem), self._slowest)
+            stage = self._problem.dt.Get()
+            if found is not None and found.rate * stage > FOLLOWED:
+                self._tell(time, stage, found)
+
+    def at_end(self, time: float) -> None:
+        """Whether a perturbation grows by a factor e in as long as the run took; its matrix is a new one."""
+        if self._answer == "off":
+            return
+        counts = self._solver.factorisations, self._solver.solves
+        found = None
+        if self._doubtful(self._slowest):
+            found = _fastest(Perturbations(self._problem, self._solver), self._slowest)
+        self._solver.factorisations, self._solver.solves = counts
+        if found is not None:
+            self._tell(time, 0.0, found)
+
+    def _doubtful(self, rate: float | None) -> bool:
+        if self._perturbations is None:
+            self._perturbations = Perturbations(self._problem, self._solver)
+        try:
+            return self._perturbations.doubtful(rate)
+        except NgswellError:
+            return True
+
+    def _tell(self, time: float, stage: float, found: Instability) -> None:
+        answer, self._answer = self._answer, "off"  # once a run
+        error = InstabilityError(time, stage, found.where, found.rate, found.wavelength, str(found), stage > 0)
+        error.end = self._problem.snapshot(time)
+        if answer == "error":
+            raise error
+        warnings.warn(InstabilityWarning(f"{error.said} {error.failure.remedy}"), stacklevel=CALLER)
+
+
+def _fastest(perturbations: Perturbations, slowest: float) -> Instability | None:
+    try:
+        return perturbations.fastest(slowest)
+    except NgswellError:
+        return None
