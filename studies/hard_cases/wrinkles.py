@@ -181,7 +181,7 @@ def refinement(
 
 
 def unresolved(watched: bool, quick: bool) -> list[Attempt]:
-    """Runs that would end unstable; `watched`, they stop and say so, else they say nothing."""
+    """Runs that would end unstable; `watched`, they stop and say so, else they end with a warning."""
 
     def stop(follow: bool = False) -> list[Observer]:
         return [Stability(follow=follow)] if watched else []
@@ -238,7 +238,7 @@ def series(quick: bool) -> list[SurfaceHistory]:
     for name, cells, seed, steps in runs:
         scene, surface = SKINNED.scene(cells, seed), Surface(SKINNED)
         probe = Probe((SKINNED.width / 2, HEIGHT / 2), "J")
-        scene.run(SKINNED.until, steps, [surface, probe], resume=scene.equilibrate())
+        scene.run(SKINNED.until, steps, [surface, probe], resume=scene.equilibrate(), unstable="off")
         amplitude = surface.amplitudes[:, SKINNED.waves]
         histories.append(SurfaceHistory(name, surface.time, probe.values["J"], amplitude, surface.x, surface.profiles[-1]))
     return histories

@@ -10,7 +10,7 @@ from ngsolve import CF, y
 from ngswell import TABLE_2, Bath, Fixed, InputError, InstabilityError, Lagged, Potential, Snapshots, Stability
 from ngswell.analysis.perturbations import Perturbations
 from ngswell.closed_forms.homogeneous import homogeneous_equilibrium
-from studies.hard_cases.wrinkles import CELLS, SKINNED, refinement, unresolved, wrinkles
+from studies.hard_cases.wrinkles import BEYOND, CELLS, HIDING, SKINNED, refinement, unresolved, wrinkles
 from studies.limits.convergence.spectra import growth_rates, held_sideways, swell
 from tests.scenes import strip
 
@@ -98,12 +98,15 @@ def test_no_run_ends_unstable_without_a_word():
             assert "wrinkles of about" in a.message
 
 
-def test_without_a_watch_they_do():
-    # The control: the same runs converge step by step to the end, where perturbations grow by a factor e within 2 s.
+def test_without_a_watch_they_end_with_a_warning():
+    # The same runs converge step by step to the end, where perturbations grow by a factor e within 2 s.
     attempts = unresolved(watched=False, quick=True)
     assert {a.outcome for a in attempts} == {"wrong"}
     assert min(a.error for a in attempts) > 0.5
-    assert not any(a.warnings for a in attempts)
+    assert all("is unstable: perturbations grow" in a.warnings[0] for a in attempts)
+    # The control: unless that is asked for.
+    scene = BEYOND.scene((16, 6), 0.0)
+    scene.run(BEYOND.until, HIDING, resume=scene.equilibrate(), unstable="off")
 
 
 def test_a_seeded_wrinkle_keeps_its_length_and_its_amplitude_converges():
