@@ -17,7 +17,7 @@ ANSWERS = ("warn", "error", "off")
 """What a state past the limit of stability is answered with."""
 
 WORK = 400
-"""Solves between two looks during a run, one with a new matrix counted as `MATRIX` solves: a hundredth of the run's time."""
+"""Solves between two looks during a run, one with a new matrix counted as `MATRIX`. A look costs a hundredth of them."""
 
 MATRIX = 4
 
@@ -37,7 +37,7 @@ class Guard:
         self._answer = "off" if quiet else answer
         self._problem, self._solver, self._slowest = problem, solver, 1 / duration
         self._perturbations: Perturbations | None = None
-        self._next = self._work() + WORK
+        self._looked = self._work()
 
     @staticmethod
     def check(what: str, answer: str) -> None:
@@ -52,14 +52,17 @@ class Guard:
 
         The matrix that the last step was solved with tells: K(σ) at σ of one over a stage.
         """
-        if self._answer == "off" or self._work() < self._next or not self._solver.direct:
+        if self._answer == "off" or self._work() < self._looked + WORK or not self._solver.direct:
             return
-        self._next = self._work() + WORK
+        self._looked = self._work()
         solves = self._solver.solves  # the run's own
         doubtful = self._doubtful(None)
         self._solver.solves = solves
         if doubtful:
-            found = _fastest(Perturbations(self._problem), self._slowest)
+            try:
+                found = Perturbations(self._problem).fastest(self._slowest)
+            except NgswellError:
+                return  # the look at the end tells
             stage = self._problem.dt.Get()
             if found is not None and found.rate * stage > FOLLOWED:
                 self._tell(time, stage, found)
@@ -71,7 +74,11 @@ class Guard:
         counts = self._solver.factorisations, self._solver.solves
         found = None
         if self._doubtful(self._slowest):
-            found = _fastest(Perturbations(self._problem, self._solver), self._slowest)
+            try:
+                found = Perturbations(self._problem, self._solver).fastest(self._slowest)
+            except NgswellError as error:
+                text = f"whether the state at t = {time:.10g} s is stable could not be told: {error}"
+                warnings.warn(InstabilityWarning(text), stacklevel=CALLER - 1)
         self._solver.factorisations, self._solver.solves = counts
         if found is not None:
             self._tell(time, 0.0, found)
@@ -91,10 +98,3 @@ class Guard:
         if answer == "error":
             raise error
         warnings.warn(InstabilityWarning(f"{error.said} {error.failure.remedy}"), stacklevel=CALLER)
-
-
-def _fastest(perturbations: Perturbations, slowest: float) -> Instability | None:
-    try:
-        return perturbations.fastest(slowest)
-    except NgswellError:
-        return None

@@ -38,6 +38,7 @@ from ngswell import (
 )
 from ngswell.closed_forms.homogeneous import homogeneous_equilibrium
 from ngswell.run import guard
+from ngswell.solve.direct import LinearSolver
 
 
 def said(act):
@@ -199,6 +200,29 @@ def test_growth_by_less_than_a_factor_e_does_not_count():
 def test_an_iterative_solver_tells_it_too():
     scene, rest = cushion(0.1)
     assert "in 1.77 s" in said(lambda: scene.run(2.0, Fixed(0.5), resume=rest, solver=TwoLevelSolver))[0]
+
+
+class Failing(LinearSolver):
+    """Finds no solution where steps are as long as the run."""
+
+    def factorise(self, matrix):
+        self.hopeless = self.problem.dt.Get() > 1.0
+        return super().factorise(matrix)
+
+    def invert(self, right, solution):
+        return super().invert(right, solution) and not self.hopeless
+
+
+def test_what_cannot_be_told_is_said():
+    scene, rest = cushion(0.3)
+
+    def failing(problem):
+        solver = Failing(problem.free)
+        solver.problem = problem
+        return solver
+
+    (message,) = said(lambda: scene.run(2.0, Fixed(0.5), resume=rest, solver=failing))
+    assert "whether the state at t = 2 s is stable could not be told: the response to a perturbation" in message
 
 
 def test_an_episode_that_steps_do_not_follow_is_told():
