@@ -39,6 +39,7 @@ from ngswell.observers.base import Observer
 from ngswell.observers.call import Call
 from ngswell.observers.coarseness import Coarseness
 from ngswell.observers.ledger import Ledger
+from ngswell.observers.outflow import Outflow
 from ngswell.observers.progress import Progress
 from ngswell.observers.sampling import Area, Integral, Probe, Snapshots
 from ngswell.observers.stability import Stability
@@ -68,11 +69,11 @@ __all__ = [
     "Blend", "Call", "Checkpoint", "Coarseness", "Concentration", "Confined", "DampedNewton", "Essential", "Fixed",
     "Frozen", "HolmesMow", "InnerLayer", "InputError", "InstabilityError", "InstabilityWarning", "Integral", "Lagged",
     "LeastSquares", "Ledger", "Load", "LocalDonnan", "MackieMeares", "Material", "Multiplier", "NeoHookean",
-    "NgswellError", "Nitsche", "Observer", "OutputError", "OverlapWarning", "Penalty", "Pin", "PlaneStrain",
-    "Potential", "PowerLaw", "Prescribed", "Probe", "Problem", "Progress", "Ramp", "Reason", "Restart", "Result",
-    "Role", "Roller", "Scene", "Setup", "Snapshot", "Snapshots", "Spatial", "Stability", "StepError", "Support",
-    "Symmetry", "Term", "Traction", "TwoLevelSolver", "Uncharged", "Weak", "Weight", "box", "check_mesh", "column",
-    "from_occ", "read_checkpoint", "read_mesh", "rectangle",
+    "NgswellError", "Nitsche", "Observer", "Outflow", "OutputError", "OverlapWarning", "Penalty", "Pin", "PlaneStrain",
+    "Potential", "PowerLaw", "Prescribed", "Probe", "Problem", "Progress", "Ramp", "Reason", "Restart", "Result", "Role",
+    "Roller", "Scene", "Setup", "Snapshot", "Snapshots", "Spatial", "Stability", "StepError", "Support", "Symmetry",
+    "Term", "Traction", "TwoLevelSolver", "Uncharged", "Weak", "Weight", "box", "check_mesh", "column", "from_occ",
+    "read_checkpoint", "read_mesh", "rectangle",
 ]  # fmt: skip
 
 for _name in __all__:

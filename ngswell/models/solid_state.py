@@ -156,3 +156,6 @@ OUTPUT_UNITS = {
     "cation_flux": "mol/l mm/s",
 }
 """Units of the outputs that models give."""
+
+FLUXES = ("seepage", "cation_flux")
+"""Outputs made of derivatives of p, P and concentrations: good inside cells, least so at baths and corners."""

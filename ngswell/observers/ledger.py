@@ -6,11 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ngswell.files import Tree
-from ngswell.mesh.points import vertices_of
-from ngswell.models.term import Kind, Role
 from ngswell.observers.base import Observer
+from ngswell.observers.effluxes import Effluxes
 from ngswell.problem.discretisation import Snapshot
-from ngswell.problem.forms import form
 from ngswell.problem.problem import Problem
 from ngswell.stepping.steps import Step
 
@@ -33,47 +31,25 @@ class Ledger(Observer):
         self._left: dict[tuple[str, str], list[float]] = {}
 
     def prepare(self, problem: Problem, begin: float, until: float) -> None:
-        self._vector = problem.fields.vec.CreateVector()
         self._vertices = {name: slice(r.start, r.start + problem.mesh.nv) for name, r in problem.ranges.items()}
-        inner = [
-            term
-            for term in problem.terms
-            if term.balance in problem.model.balanced and term.kind is not Kind.RATE and term.role is not Role.EFFLUX
-        ]
-        self._flows = form(problem, inner)
-        self._nodes: dict[tuple[str, str], NDArray] = {}
-        taken = np.zeros(problem.mesh.nv, dtype=bool)
-        for bath in problem.setup.baths:
-            mine = np.array([number for number in sorted(vertices_of(problem.mesh, bath.boundary)) if not taken[number]])
-            taken[mine] = True
-            for name, unknown in problem.model.balanced.items():
-                self._nodes[name, bath.boundary] = problem.ranges[unknown].start + mine
-        self._left = {key: [0.0] for key in self._nodes}
-        self._contents = self._contents_at_nodes(problem)
-
-    def _contents_at_nodes(self, problem: Problem) -> dict[tuple[str, str], float]:
-        problem.contents(self._vector)
-        return self._sums()
-
-    def _sums(self) -> dict[tuple[str, str], float]:
-        values = self._vector.FV().NumPy()
-        return {key: float(values[dofs].sum()) for key, dofs in self._nodes.items()}
+        self._effluxes = Effluxes(problem)
+        self._left = {key: [0.0] for key in self._effluxes.nodes}
+        self._contents = self._effluxes.sums(self._effluxes.contents())
 
     def record(self, problem: Problem, time: float) -> None:
-        problem.contents(self._vector)
-        held = self._vector.FV().NumPy()
+        held = self._effluxes.contents()
         for name, unknown in problem.model.balanced.items():
             self._held.setdefault(name, []).append(held[self._vertices[unknown]].sum())
 
     def observe(self, problem: Problem, step: Step) -> None:
-        contents = self._contents_at_nodes(problem)
+        effluxes = self._effluxes
+        contents = effluxes.sums(effluxes.contents())
         gone = {key: self._contents[key] - now for key, now in contents.items()}
         self._contents = contents
         end = problem.snapshot(step.time)
         for weight, time, values in step.stages:
             problem.restore(Snapshot(time, values))
-            self._flows.Apply(problem.fields.vec, self._vector)
-            for key, flow in self._sums().items():
+            for key, flow in effluxes.sums(effluxes.flows()).items():
                 gone[key] -= weight * flow
         problem.restore(end)
         for key, amount in gone.items():
@@ -88,7 +64,7 @@ class Ledger(Observer):
 
     def restore(self, state: Tree) -> None:
         self._held = {name: list(values) for name, values in state["held"].items()}
-        self._left = {(name, boundary): list(state["left"][name][boundary]) for name, boundary in self._nodes}
+        self._left = {(name, boundary): list(state["left"][name][boundary]) for name, boundary in self._effluxes.nodes}
 
     @property
     def fluid(self) -> NDArray:

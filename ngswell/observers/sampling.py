@@ -12,6 +12,7 @@ from ngswell import checks
 from ngswell.errors import InputError
 from ngswell.files import Tree
 from ngswell.mesh.points import integral_on_boundary
+from ngswell.models.solid_state import FLUXES
 from ngswell.observers.base import Observer
 from ngswell.problem.discretisation import Snapshot
 from ngswell.problem.problem import Problem
@@ -56,7 +57,11 @@ class Probe(Observer):
 
 
 class Integral(Observer):
-    """Integral of a quantity over the deformed body, or over the deformed `boundary`; of 1 if no quantity is named."""
+    """Integral of a quantity over the deformed body, or over the deformed `boundary`; of 1 if no quantity is named.
+
+    Raises InputError for a flux on a boundary: `Outflow` has it from the balances. "stress" is made of derivatives too: its
+    integral over a held side or a corner is off at any mesh where the stress is singular, and is no reaction.
+    """
 
     def __init__(
         self,
@@ -68,6 +73,11 @@ class Integral(Observer):
         for what, value, example in (("quantity", quantity, "p"), ("boundary", boundary, "top")):
             if value is not None:
                 checks.name(f"Integral: {what}", value, example)
+        if quantity in FLUXES and boundary is not None:
+            raise InputError(
+                f"Integral: {quantity!r} on a boundary would be the sum of derivatives where they are least accurate; "
+                "what passes a bath is in Outflow('top') at each time and in Ledger() in all, and elsewhere nothing passes"
+            )
         self.quantity, self.boundary = quantity, boundary
         self._values: list = []
 

@@ -170,7 +170,7 @@ class Stepper:
         proposed = self.control.next(dt, error, scheme.power)
         self._wanted = max(self._wanted, proposed) if landed_short else proposed
         self._keep(end)
-        return Step(end, dt, attempt.iterations, rejected, error, attempt.stages)
+        return Step(end, dt, attempt.iterations, rejected, error, attempt.stages, attempt.slope)
 
     # -- errors ---------------------------------------------------------------------------------------------------------
 

@@ -47,9 +47,14 @@ class StepReport:
 
 @dataclass(frozen=True)
 class Step(StepReport):
-    """The same with its stages, for observers."""
+    """The same with its stages, for observers.
+
+    `slope` is what each content falls by in unit time at the end of the step, as the scheme has it; None where only backward
+    Euler's steps are taken, in which contents fall evenly.
+    """
 
     stages: tuple[Stage, ...] = ()
+    slope: NDArray | None = None
 
     def report(self) -> StepReport:
         """Without the states of the stages."""

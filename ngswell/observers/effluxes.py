@@ -1,0 +1,53 @@
+"""What the balances of the nodes on a bath lack: the one place that knows which nodes and flows those are."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ngswell.mesh.points import vertices_of
+from ngswell.models.term import Kind, Role
+from ngswell.problem.forms import form
+from ngswell.problem.problem import Problem
+
+
+class Effluxes:
+    """Flows of the body to the nodes on baths, and the vertices that count with each bath.
+
+    Contents fall by what flows off inside and by what leaves; the flows inside are those of all terms but storage and
+    effluxes. A vertex that two baths share counts with the first.
+    """
+
+    def __init__(self, problem: Problem) -> None:
+        self._problem, self._vector = problem, problem.fields.vec.CreateVector()
+        inner = [
+            term
+            for term in problem.terms
+            if term.balance in problem.model.balanced and term.kind is not Kind.RATE and term.role is not Role.EFFLUX
+        ]
+        self._flows = form(problem, inner)
+        self.vertices: dict[str, NDArray] = {}
+        taken = np.zeros(problem.mesh.nv, dtype=bool)
+        for bath in problem.setup.baths:
+            mine = np.array([number for number in sorted(vertices_of(problem.mesh, bath.boundary)) if not taken[number]])
+            taken[mine] = True
+            self.vertices[bath.boundary] = mine
+        self.nodes = {
+            (name, boundary): problem.ranges[unknown].start + mine
+            for boundary, mine in self.vertices.items()
+            for name, unknown in problem.model.balanced.items()
+        }
+
+    def contents(self) -> NDArray:
+        """Contents of all nodes at the present fields; a view that the next call changes."""
+        self._problem.contents(self._vector)
+        return self._vector.FV().NumPy()
+
+    def flows(self) -> NDArray:
+        """What flows off inside the body in unit time, at the present fields; a view that the next call changes."""
+        self._flows.Apply(self._problem.fields.vec, self._vector)
+        return self._vector.FV().NumPy()
+
+    def sums(self, values: NDArray) -> dict[tuple[str, str], float]:
+        """Sums over the vertices of each bath, by balance and boundary."""
+        return {key: float(values[dofs].sum()) for key, dofs in self.nodes.items()}

@@ -1,0 +1,148 @@
+"""The flow through a bath, from the balances of its nodes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from ngsolve import BilinearForm, BoundaryFromVolumeCF, CoefficientFunction, GridFunction, Mesh, Norm, ds
+from numpy.typing import NDArray
+
+from ngswell import checks
+from ngswell.errors import InputError
+from ngswell.files import Tree
+from ngswell.mesh.points import vertices_of
+from ngswell.observers.base import Observer
+from ngswell.observers.effluxes import Effluxes
+from ngswell.problem.forms import BONUS_ORDER
+from ngswell.problem.problem import Problem
+from ngswell.stepping.steps import Step
+
+ON_BOUNDARY = 1e-9
+"""Share of a cell by which a point may miss the boundary."""
+
+
+class Outflow(Observer):
+    """Fluid and cations that leave through one bath in unit time, and at `points` [mm] on it per current area.
+
+        outflow = Outflow("top", (0.5, 1.0))
+
+    Not taken from derivatives: it is what the balances of the nodes on the bath lack, as in `Ledger`, whose amounts are its
+    integral over time. The flux q at a point is the trace (order of p or P) with
+
+        ∫ q δ da = what the balance tested with δ lacks, for all traces δ;
+
+    with δ = 1 its integral over the boundary is the whole outflow. Where two baths meet, the shared node counts
+    with the first, and in the cells beside it q is rough.
+
+    One entry a time: `fluid` [mm²/s, in 1-d mm/s, in 3-d mm³/s], `fluid_at` (rows of time, columns of points) [mm/s] and,
+    where the model has them, `cations`, `cations_at` [mol/l times that]. Not a number at the start, before anything flowed.
+    Raises InputError for a boundary that is no bath's and for points off it.
+    """
+
+    def __init__(self, boundary: str, *points: Sequence[float], when: float | Sequence[float] | None = None) -> None:
+        checks.name("Outflow: boundary", boundary, "top")
+        self.boundary = boundary
+        self.points = tuple(checks.vector("Outflow: a point", point, 1e6, "mm") for point in points)
+        super().__init__(when, boundary, *self.points)
+        self._whole: dict[str, list[float]] = {}
+        self._local: dict[str, list[list[float]]] = {}
+
+    def prepare(self, problem: Problem, begin: float, until: float) -> None:
+        self._effluxes = Effluxes(problem)
+        if self.boundary not in self._effluxes.vertices:
+            known = ", ".join(map(repr, self._effluxes.vertices)) or "none"
+            raise InputError(f"Outflow: {self.boundary!r} is no bath's boundary; those of the baths are {known}")
+        self._traces = {
+            name: _Trace(problem, self.boundary, unknown, self.points) for name, unknown in problem.model.balanced.items()
+        }
+        self._contents = self._effluxes.contents().copy()
+        self._rate = np.full(problem.space.ndof, np.nan)
+
+    def observe(self, problem: Problem, step: Step) -> None:
+        contents = self._effluxes.contents().copy()
+        self._rate = (self._contents - contents) / step.dt if step.slope is None else step.slope
+        self._contents = contents
+        super().observe(problem, step)
+
+    def record(self, problem: Problem, time: float) -> None:
+        lacks = self._rate - self._effluxes.flows()
+        sums = self._effluxes.sums(lacks)
+        for name, trace in self._traces.items():
+            self._whole.setdefault(name, []).append(sums[name, self.boundary])
+            self._local.setdefault(name, []).append(trace.flux(lacks))
+
+    def state(self) -> Tree:
+        local = {name: np.array(rows) for name, rows in self._local.items()}
+        return {"whole": {name: np.array(values) for name, values in self._whole.items()}, "local": local}
+
+    def restore(self, state: Tree) -> None:
+        self._whole = {name: list(values) for name, values in state["whole"].items()}
+        self._local = {name: [list(row) for row in rows] for name, rows in state["local"].items()}
+
+    @property
+    def fluid(self) -> NDArray:
+        return np.array(self._whole["fluid"])
+
+    @property
+    def cations(self) -> NDArray:
+        return np.array(self._whole["cations"])
+
+    @property
+    def fluid_at(self) -> NDArray:
+        return np.array(self._local["fluid"])
+
+    @property
+    def cations_at(self) -> NDArray:
+        return np.array(self._local["cations"])
+
+
+class _Trace:
+    """The flux on one boundary as a trace of one unknown's space, at points."""
+
+    def __init__(self, problem: Problem, boundary: str, unknown: str, points: Sequence[tuple[float, ...]]) -> None:
+        mesh, number = problem.mesh, problem.names.index(unknown)
+        space = problem.fields.components[number].space
+        region = mesh.Boundaries(boundary)
+        names = [bath.boundary for bath in problem.setup.baths]
+        before = "|".join(names[: names.index(boundary)])
+        self._dofs = np.flatnonzero(list(space.GetDofs(region)))
+        theirs = np.array(list(space.GetDofs(mesh.Boundaries(before)))) if before else np.zeros(space.ndof, dtype=bool)
+        self._others = np.flatnonzero(theirs[self._dofs])  # count with the baths before
+        self._offset = problem.ranges[unknown].start
+        self._field = GridFunction(space)
+        self._where = [self._point(mesh, point, boundary) for point in points]
+        stretch: CoefficientFunction | float = 1.0
+        if mesh.dim > 1:
+            stretch = Norm(BoundaryFromVolumeCF(problem.state.cofactor) * problem.kinematics.normal)
+        q, test = space.TnT()
+        integrand = problem.kinematics.weight * stretch * q * test
+        self._mass = BilinearForm(space)
+        self._mass += integrand * ds(definedon=region, bonus_intorder=BONUS_ORDER)
+
+    def _point(self, mesh: Mesh, point: tuple[float, ...], boundary: str) -> Any:
+        """The point, refused off the boundary: there not all vertex functions that are not zero belong to the boundary."""
+        if len(point) == mesh.dim and mesh.Contains(*point):
+            self._field.vec.FV().NumPy()[sorted(vertices_of(mesh, boundary))] = 1.0
+            if abs(self._field(mesh(*point)) - 1.0) < ON_BOUNDARY:
+                return mesh(*point)
+        raise InputError(f"Outflow: {point} is not a point of the boundary {boundary!r}")
+
+    def flux(self, lacks: NDArray) -> list[float]:
+        """At the points, per current area; what the nodes' balances lack is all of it."""
+        if not self._where:
+            return []
+        right = lacks[self._offset + self._dofs]
+        right[self._others] = 0.0
+        self._mass.Assemble()
+        rows, columns, values = self._mass.mat.COO()
+        place = np.full(self._field.space.ndof, -1)
+        place[self._dofs] = np.arange(len(self._dofs))
+        rows, columns, values = (np.asarray(part) for part in (rows, columns, values))
+        mine = (place[rows] >= 0) & (place[columns] >= 0)
+        mass = np.zeros((len(right), len(right)))
+        mass[place[rows[mine]], place[columns[mine]]] = values[mine]
+        self._field.vec[:] = 0.0
+        self._field.vec.FV().NumPy()[self._dofs] = np.linalg.solve(mass, right)
+        return [float(self._field(where)) for where in self._where]
