@@ -26,6 +26,7 @@ from ngswell import (
     Lagged,
     Ledger,
     Multiplier,
+    Outflow,
     OutputError,
     Potential,
     Probe,
@@ -79,7 +80,7 @@ def watched(dimension):
     end = (0.5,) if dimension == 1 else (0.0, 0.5)
     return [
         Probe(end, "displacement", "J", "p"), Probe(end, "c_plus", when=7.0), Integral("p"), Integral(boundary="top"),
-        Area(), Ledger(), Coarseness(), Snapshots([0.0, 3.0, 15.0, 39.0]), Progress(),
+        Area(), Ledger(), Outflow("top", end), Coarseness(), Snapshots([0.0, 3.0, 15.0, 39.0]), Progress(),
     ]  # fmt: skip
 
 
