@@ -16,6 +16,7 @@ from ngswell.run.equilibrium import equilibrate
 from ngswell.run.restart import Restart
 from ngswell.run.result import Result
 from ngswell.run.run import run
+from ngswell.setup.limits import limits
 from ngswell.setup.setup import Setup
 from ngswell.solve.direct import LinearSolver, solver_of
 from ngswell.solve.newton import DampedNewton
@@ -59,6 +60,7 @@ class Scene(Setup):
             carried = "; a porous plate carries its pressure" if bath.porous_plate else ""
             lines.append(f"  bath on {bath.boundary}: {self.treatment(bath)}{carried}")
         lines += [f"  {name}: {law}" for name, law in self.material.laws().items()]
+        lines += [f"  limit: {limit}" for limit in limits(self)]
         return "\n".join(lines)
 
     def equilibrate(

@@ -126,7 +126,10 @@ class SolidState:
         return outputs[name]
 
     def at(self, point: Sequence[float], name: str) -> float | tuple[float, ...]:
-        """An output of a result at a point of the reference configuration [mm], in the unit of `OUTPUT_UNITS`."""
+        """An output of a result at a point of the reference configuration [mm], in the unit of `OUTPUT_UNITS`.
+
+        Fluxes and stress are made of derivatives: good inside cells. At a bath take `Outflow`, see docs/limits.md.
+        """
         mesh, point = self.mesh, checks.vector("a point", point, 1e6, "mm")
         if len(point) != mesh.dim or not mesh.Contains(*point):
             raise InputError(f"{point} is not a point of the {mesh.dim}-d body")

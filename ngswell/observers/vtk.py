@@ -19,7 +19,8 @@ from ngswell.problem.problem import Problem
 class VTK(Observer):
     """Writes `path`.pvd and one .vtu file a record, on the reference configuration (warp by "displacement").
 
-    All the model's quantities by default, or those named. Vectors have three components and stresses nine, as VTK readers
+    All the model's quantities by default, or those named; fluxes and stresses, made of derivatives, mislead at baths, held
+    sides and corners (docs/limits.md). Vectors have three components and stresses nine, as VTK readers
     expect. `subdivision` splits each element edge 2^n times, so that quadratic displacements show. Existing series are
     kept unless `overwrite`; then the old series is removed as a whole. Raises OutputError before any computing, and
     InputError on a 1-d mesh. At every moment the .pvd names complete pieces only; a resumed run replaces those beyond its

@@ -124,3 +124,22 @@ def test_refused(change, words):
 def test_kinematics_are_interchangeable_only_where_they_fit():
     with pytest.raises(InputError, match="PlaneStrain needs a 2-d mesh"):
         Scene(mesh=column(1.0, 2), kinematics=PlaneStrain(), material=TABLE_1, baths=[Bath("top", c=0.1)])
+
+
+def test_zero_current_is_named_where_it_is_more_than_conservation_of_charge():
+    """In 2-d and 3-d between baths that differ; in 1-d both agree, and without ions there is no current."""
+    constant, changing = Ramp((0, 0.15)), Ramp((0, 0.15), (10, 0.1))
+    blended = Blend(constant, changing, 50 * x)
+    uncharged = {"model": Uncharged(), "material": UNCHARGED, "loads": []}
+
+    def named(**changes):
+        return "zero current" in strip(None, **{"model": Potential(), "cells": (1, 2), **changes}).describe()
+
+    assert named(baths=[Bath("top", c=changing), Bath("bottom", c=0.15)])
+    assert named(baths=[Bath("top", c=blended)])
+    assert named(baths=[Bath("top", c=blended), Bath("bottom", c=Blend(constant, changing, 0.5 + 25 * x))])
+    assert not named()
+    assert not named(baths=[Bath("top", c=changing), Bath("bottom", c=changing)])
+    assert not named(baths=[Bath("top"), Bath("bottom", P=Ramp((0, 0.0), (1, 0.1)))], **uncharged)
+    sides = [Bath("top", c=changing), Bath("bottom", c=0.15)]
+    assert not named(mesh=column(0.5, 2), kinematics=Confined(), supports=[Roller("bottom", "x")], baths=sides, loads=[])
