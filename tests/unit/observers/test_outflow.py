@@ -103,7 +103,7 @@ def test_baths_that_meet_share_what_passes():
 
 def test_the_sign_where_derivatives_have_the_other():
     """Table 2 in 4.1 mol/l, bath suddenly 0.3: after 10 s fluid still leaves, by 3.166e-4 mm/s (order 3 and 4 on 40 graded
-    cells and `Concentration` of order 3 on 60 agree to 1e-5), while it swells inside the first cell. On ten even cells of
+    cells and `Concentration` of order 3 on 60 agree to 4e-5), while it swells inside the first cell. On ten even cells of
     order 2 the layer is as thin as a cell: a quarter off, the error of the mesh.
     """
     p0 = donnan.pressure(4.1, TABLE_2.cfc0, TABLE_2.RT)
