@@ -21,7 +21,7 @@ WORK = 400
 
 MATRIX = 4
 
-CALLER = 5
+CALLER = 6
 """Frames from the warning to whoever called the method of a scene."""
 
 

@@ -47,8 +47,7 @@ def run(
     unstable: str = "warn",
 ) -> Result:
     """The run that `Scene.run` describes."""
-    Guard.check("run", unstable)
-    method = _Method.checked(setup, steps, newton, solver)
+    method = _Method.checked(setup, steps, newton, solver, unstable)
     watch = Watch(observers)
     start = _Start.checked(setup, until, resume, checkpoint, watch)
     method.check_first_step(start.begin, start.until)
@@ -106,8 +105,14 @@ class _Method:
 
     @classmethod
     def checked(
-        cls, setup: Setup, steps: Control | None, newton: DampedNewton | None, solver: Callable[[Problem], LinearSolver]
+        cls,
+        setup: Setup,
+        steps: Control | None,
+        newton: DampedNewton | None,
+        solver: Callable[[Problem], LinearSolver],
+        unstable: str,
     ) -> _Method:
+        Guard.check("run", unstable)
         control = Adaptive() if steps is None else steps
         checks.instance("steps", control, Control, "Adaptive(tolerance) or Fixed(step)")
         if newton is not None:
