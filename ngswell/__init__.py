@@ -48,7 +48,6 @@ from ngswell.physics.kinematics import Axisymmetric, Confined, PlaneStrain, Spat
 from ngswell.physics.material import TABLE_1, TABLE_2, Material
 from ngswell.physics.pores import HolmesMow, MackieMeares, PowerLaw
 from ngswell.physics.solid import NeoHookean
-from ngswell.problem.discretisation import Snapshot
 from ngswell.problem.problem import Problem
 from ngswell.run.checkpoint import Checkpoint
 from ngswell.run.restart import Restart, read_checkpoint
@@ -57,6 +56,7 @@ from ngswell.scene import Scene
 from ngswell.schedules import Blend, Ramp
 from ngswell.setup.loads import Load, Traction, Weight
 from ngswell.setup.setup import Setup
+from ngswell.setup.snapshot import Snapshot
 from ngswell.setup.supports import Pin, Roller, Support, Symmetry
 from ngswell.solve.newton import DampedNewton
 from ngswell.solve.two_level import TwoLevelSolver

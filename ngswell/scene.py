@@ -8,16 +8,22 @@ from functools import cached_property
 from typing import Any
 
 from ngswell.analysis.one_step import Growth, growth_factor
+from ngswell.baths.bath import Bath
 from ngswell.observers.base import Observer
-from ngswell.problem.discretisation import Discretisation, Snapshot
+from ngswell.problem.discretisation import Discretisation
 from ngswell.problem.problem import Problem
 from ngswell.run.checkpoint import Checkpoint
 from ngswell.run.equilibrium import equilibrate
 from ngswell.run.restart import Restart
 from ngswell.run.result import Result
 from ngswell.run.run import run
+from ngswell.schedules import Ramp
 from ngswell.setup.limits import limits
+from ngswell.setup.loads import Load
+from ngswell.setup.sequence import following
 from ngswell.setup.setup import Setup
+from ngswell.setup.snapshot import Snapshot
+from ngswell.setup.supports import Support
 from ngswell.solve.direct import LinearSolver, solver_of
 from ngswell.solve.newton import DampedNewton
 from ngswell.stepping.steps import Control
@@ -40,6 +46,34 @@ class Scene(Setup):
     def state(self, snapshot: Snapshot) -> Any:
         """The model's state at a snapshot: `scene.state(scene.equilibrate()).at((1.1, 0.5), "J")`. No run changes it."""
         return Discretisation(self).state_at(snapshot)
+
+    def after(
+        self,
+        end: Result | Snapshot,
+        *,
+        start: float | None = None,
+        baths: Sequence[Bath] | None = None,
+        loads: Sequence[Load] | None = None,
+        supports: Sequence[Support] | None = None,
+        charge: Ramp | None = None,
+    ) -> Scene:
+        """The next part of a test: this scene with other pieces, which starts from where `end` leaves the body.
+
+            swollen = scene.run(3600)
+            pressed = scene.after(swollen, start=0.0, loads=[Pressing("top", Ramp((0, 0.0), (10, 0.05)))]).run(600)
+
+        `end` is a result or a snapshot of this scene, such as its state of rest. Pieces that are not given stay. Times go
+        on from those of `end`; with `start=0.0` the clock of the new part starts at zero, and histories count from now.
+        What the new scene does, checkpoints and observers included, begins there.
+
+        Raises InputError for a snapshot of another mesh, model or order, for a history that is over before the part begins
+        or that stays although its clock changes, and for a support where the body has moved already.
+        """
+        given = {"baths": baths, "loads": loads, "supports": supports, "charge": charge}
+        snapshot = end.end if isinstance(end, Result) else end
+        scene = following(self, snapshot, start, {name: piece for name, piece in given.items() if piece is not None})
+        Discretisation(scene).check("after", snapshot)
+        return scene
 
     def describe(self) -> str:
         """What this scene models: unknowns, degrees of freedom, terms; what is not listed is not computed."""

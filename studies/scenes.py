@@ -30,7 +30,8 @@ from ngswell import (
 from ngswell.baths.treatment import Treatment
 from ngswell.models.model import Model
 from ngswell.physics import donnan
-from ngswell.problem.discretisation import Discretisation, Snapshot
+from ngswell.problem.discretisation import Discretisation
+from ngswell.setup.snapshot import Snapshot
 
 WEAK = Penalty(1.0)
 """The paper's penalty for Table 1."""

@@ -13,10 +13,10 @@ from ngswell.analysis.perturbations import Perturbations
 from ngswell.baths.treatment import Charge
 from ngswell.errors import UNCONVERGED, Failure, NgswellError, Reason, place
 from ngswell.mesh.points import vertices
-from ngswell.problem.discretisation import Snapshot
 from ngswell.problem.forms import form
 from ngswell.problem.problem import Problem
 from ngswell.setup.rigid_motions import name_of_motion, rigid_motions
+from ngswell.setup.snapshot import Snapshot
 
 BALANCED = 1e-2
 """Share of the largest force that a state at rest leaves at most; Newton's tolerance leaves far less."""

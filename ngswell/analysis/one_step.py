@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from ngswell import checks
 from ngswell.errors import NgswellError
-from ngswell.problem.discretisation import Snapshot
 from ngswell.problem.problem import Problem
 from ngswell.setup.setup import Setup
+from ngswell.setup.snapshot import Snapshot
 from ngswell.solve.direct import LinearSolver
 from ngswell.solve.factorisation import Factorisation
 from ngswell.solve.newton import DampedNewton

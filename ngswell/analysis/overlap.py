@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from ngswell.errors import OverlapWarning, place
 from ngswell.mesh.parts import Sides
 from ngswell.mesh.points import vertices
-from ngswell.problem.discretisation import Discretisation, Snapshot
+from ngswell.problem.discretisation import Discretisation
+from ngswell.setup.snapshot import Snapshot
 
 MOST_PAIRS = 4_000_000
 """Pairs of a cell and a side that are looked at; of larger bodies only some cells are, evenly spread."""

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from hashlib import sha256
+
 import numpy as np
-from ngsolve import BND, ET, VOL, BoundaryFromVolumeCF, CoefficientFunction, Integrate, IntegrationRule, Mesh
+from ngsolve import BND, CF, ET, VOL, BoundaryFromVolumeCF, CoefficientFunction, Integrate, IntegrationRule, Mesh, x, y, z
 from numpy.typing import NDArray
 
 _SHAPES = (ET.SEGM, ET.TRIG, ET.QUAD, ET.TET, ET.HEX, ET.PRISM, ET.PYRAMID)
@@ -61,3 +63,10 @@ def vertices_of(mesh: Mesh, boundary: str) -> set[int]:
 def vertices(mesh: Mesh) -> NDArray:
     """Coordinates of the vertices [mm], one row each, in the order of their numbers."""
     return np.array([vertex.point for vertex in mesh.vertices])
+
+
+def digest(mesh: Mesh) -> str:
+    """What tells a mesh from another, in every process: its vertices, cells with their materials, sides, curved shape."""
+    cells = [(e.mat, [v.nr for v in e.vertices]) for region in (VOL, BND) for e in mesh.Elements(region)]
+    shape = CF((x, y, z)[: mesh.dim])(points(mesh)).astype(np.float32)  # processors differ in the last digits of a double
+    return sha256(repr((vertices(mesh).tolist(), cells, shape.tolist())).encode()).hexdigest()

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from ngswell.files import Tree
 from ngswell.observers.base import Observer
 from ngswell.observers.effluxes import Effluxes
-from ngswell.problem.discretisation import Snapshot
 from ngswell.problem.problem import Problem
+from ngswell.setup.snapshot import Snapshot
 from ngswell.stepping.steps import Step
 
 

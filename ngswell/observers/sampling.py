@@ -14,8 +14,8 @@ from ngswell.files import Tree
 from ngswell.mesh.points import integral_on_boundary
 from ngswell.models.solid_state import FLUXES
 from ngswell.observers.base import Observer
-from ngswell.problem.discretisation import Snapshot
 from ngswell.problem.problem import Problem
+from ngswell.setup.snapshot import Snapshot
 
 
 class Probe(Observer):
@@ -124,6 +124,9 @@ class Snapshots(Observer):
         super().__init__(when)
         self.states: list[Snapshot] = []
 
+    def prepare(self, problem: Problem, begin: float, until: float) -> None:
+        self._meaning = problem.meaning
+
     def record(self, problem: Problem, time: float) -> None:
         self.states.append(problem.snapshot(time))
 
@@ -131,4 +134,6 @@ class Snapshots(Observer):
         return {"values": np.array([state.values for state in self.states])}
 
     def restore(self, state: Tree) -> None:
-        self.states = [Snapshot(time, values) for time, values in zip(self._recorded, state["values"], strict=True)]
+        self.states = [
+            Snapshot(time, values, self._meaning) for time, values in zip(self._recorded, state["values"], strict=True)
+        ]

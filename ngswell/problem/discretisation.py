@@ -2,30 +2,26 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
-from ngsolve import CF, H1, VOL, BitArray, Compress, FESpace, GridFunction
+from ngsolve import BND, CF, H1, VOL, BitArray, Compress, FESpace, GridFunction
 from numpy.typing import NDArray
 
 from ngswell import checks
 from ngswell.errors import InputError
-from ngswell.mesh.points import points, vertices
+from ngswell.mesh.points import digest, points, vertices
 from ngswell.models.model import BathFields, FieldContext
 from ngswell.setup.setup import Setup
+from ngswell.setup.snapshot import Snapshot
 
 BONUS_ORDER = 2
 """Extra integration order: the pulled-back terms are rational in F."""
 
 
-@dataclass(frozen=True)
-class Snapshot:
-    """The fields at one time: what a run can go on from. `values` are all coefficients, in the order of the space."""
-
-    time: float
-    values: NDArray
+ROUND_OFF = 1e-12
+"""What a held displacement may be, in units of its reference, and count as none."""
 
 
 class Discretisation:
@@ -95,11 +91,52 @@ class Discretisation:
         components = self.kinematics.dimension if name == self.model.unknowns[0] else 1
         return vector[self.ranges[name]].reshape(components, -1)[:, : self.mesh.nv]
 
+    @cached_property
+    def meaning(self) -> dict[str, str]:
+        """What coefficients are those of: equal for two scenes whose snapshots can be exchanged."""
+        spans = [f"{name} {part.start}:{part.stop}" for name, part in self.ranges.items()]
+        multipliers = [bath.boundary for bath, treatment in self.setup.weak_baths if treatment.multipliers]
+        return {
+            "mesh": f"{self.mesh.ne} cells, {self.mesh.nv} vertices, {digest(self.mesh)[:12]}",
+            "kinematics": type(self.kinematics).__name__,
+            "model": f"{type(self.model).__name__} of order {self.model.order}",
+            "unknowns": ", ".join(spans) + (f", multipliers on {'|'.join(multipliers)}" if multipliers else ""),
+        }
+
     def check(self, what: str, snapshot: Snapshot) -> None:
-        """Refuse a snapshot of another discretisation."""
+        """Refuse a snapshot whose values mean something else here, or displace what this scene holds."""
         checks.instance(what, snapshot, Snapshot, "a snapshot, such as `result.end`")
+        if snapshot.meaning and snapshot.meaning != self.meaning:
+            name = next(name for name, mine in self.meaning.items() if snapshot.meaning.get(name) != mine)
+            raise InputError(
+                f"{what}: the snapshot has another {name} ({snapshot.meaning.get(name)}) than the scene "
+                f"({self.meaning[name]}); go on with the scene that it comes from, or with what its `after` gives"
+            )
         if snapshot.values.shape != (self.space.ndof,):
             raise InputError(f"{what}: the snapshot has {snapshot.values.size} unknowns, the scene {self.space.ndof}")
+        displaced = np.abs(snapshot.values[self._held])
+        if displaced.size and not displaced.max() <= ROUND_OFF * self.references[self.names[0]]:
+            worst = int(np.argmax(np.where(np.isfinite(displaced), displaced, np.inf)))
+            place = ", ".join(f"{value:.4g}" for value in self._place(int(self._held[worst])))
+            raise InputError(
+                f"{what}: the snapshot displaces the body by {displaced[worst]:.3g} mm near ({place}) mm, where a support "
+                "of the scene holds it; a support can hold only what has not moved there"
+            )
+
+    @cached_property
+    def _held(self) -> NDArray:
+        """Numbers of the displacement's coefficients that supports hold at zero."""
+        return np.flatnonzero(~np.array(list(self.free))[: self.ranges[self.names[0]].stop])
+
+    def _place(self, dof: int) -> tuple[float, ...]:
+        """About where [mm] a displacement's coefficient acts: its vertex, or the middle of its element."""
+        space = self.space.components[0]
+        vertex = dof % (space.ndof // len(self.kinematics.directions))
+        if vertex < self.mesh.nv:
+            return self.mesh.vertices[vertex].point
+        elements = (element for region in (BND, VOL) for element in space.Elements(region))
+        element = next(element for element in elements if dof in element.dofs)
+        return tuple(np.mean([self.mesh.vertices[v.nr].point for v in element.vertices], axis=0))
 
     def state_at(self, snapshot: Snapshot) -> Any:
         """The model's state at a snapshot, on fields of its own: what a later run does leaves it as it is."""

@@ -13,11 +13,12 @@ from ngswell.models.model import BathFields, FieldContext
 from ngswell.models.term import Kind, Term
 from ngswell.problem.admissible import Admissible
 from ngswell.problem.bounded import set_bounded
-from ngswell.problem.discretisation import Discretisation, Snapshot
+from ngswell.problem.discretisation import Discretisation
 from ngswell.problem.forms import cell_size, form
 from ngswell.problem.prescribed import PrescribedValues
 from ngswell.schedules import Clock
 from ngswell.setup.setup import Setup
+from ngswell.setup.snapshot import Snapshot
 
 
 class Problem(Discretisation):
@@ -115,7 +116,7 @@ class Problem(Discretisation):
 
     def snapshot(self, time: float) -> Snapshot:
         """The present fields, as those at `time` [s]."""
-        return Snapshot(time, self.vector.copy())
+        return Snapshot(time, self.vector.copy(), self.meaning)
 
     def restore(self, snapshot: Snapshot) -> None:
         """Put the fields and the clock back to a snapshot. Raises InputError for one of another discretisation."""

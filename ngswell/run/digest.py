@@ -7,10 +7,10 @@ from hashlib import sha256
 from typing import Any
 
 import numpy as np
-from ngsolve import BND, CF, VOL, CoefficientFunction, x, y, z
+from ngsolve import CF, VOL, CoefficientFunction
 from numpy.typing import NDArray
 
-from ngswell.mesh.points import points, vertices
+from ngswell.mesh.points import digest, points
 from ngswell.physics.material import Material
 from ngswell.physics.solid import nominal_stress
 from ngswell.setup.setup import Setup
@@ -24,11 +24,9 @@ _SAMPLES = ((0.8, 0.0), (1.5, 0.3), (3.0, -0.5))
 def setup_digest(setup: Setup) -> dict[str, str]:
     """A digest of each part. Fields of position count by their values at quadrature points, to six digits."""
     mesh = setup.mesh
-    places, inside = vertices(mesh), points(mesh, VOL, 4)
-    cells = [(e.mat, [v.nr for v in e.vertices]) for region in (VOL, BND) for e in mesh.Elements(region)]
-    shape = digest_of_numbers(CF((x, y, z)[: mesh.dim])(inside))
+    inside = points(mesh, VOL, 4)
     texts = {name: canonical_text(getattr(setup, name), inside) for name in _PARTS}
-    texts["mesh"] = repr((places.tolist(), cells, shape))
+    texts["mesh"] = digest(mesh)
     texts["material"] += repr(setup.material.samples) + _solid_samples(setup.material, inside)
     texts["baths"] = repr(
         [
@@ -37,6 +35,9 @@ def setup_digest(setup: Setup) -> dict[str, str]:
             for bath in setup.baths
         ]
     )
+    if setup.origin is not None:
+        numbers = sha256(np.ascontiguousarray(setup.origin.values).tobytes()).hexdigest()
+        texts["origin"] = repr((setup.origin.time, numbers))
     return {name: sha256(text.encode()).hexdigest() for name, text in texts.items()}
 
 

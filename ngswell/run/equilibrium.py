@@ -13,12 +13,12 @@ from ngswell.analysis.overlap import warn_of_overlap
 from ngswell.baths.treatment import Charge
 from ngswell.errors import UNCONVERGED, Failure, InputError, Reason, StepError
 from ngswell.observers.base import Observer
-from ngswell.problem.discretisation import Snapshot
 from ngswell.problem.problem import Problem
 from ngswell.run.guard import Guard
 from ngswell.run.watch import Watch
 from ngswell.schedules import LARGEST
 from ngswell.setup.setup import Setup
+from ngswell.setup.snapshot import Snapshot
 from ngswell.solve.direct import LinearSolver, solver_of
 from ngswell.solve.factorisation import Factorisation
 from ngswell.solve.newton import DampedNewton, Outcome

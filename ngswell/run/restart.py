@@ -13,13 +13,13 @@ from ngswell import checks
 from ngswell.errors import InputError, Reason, Rejection
 from ngswell.files import Tree, read_tree, write_tree
 from ngswell.observers.base import Observer
-from ngswell.problem.discretisation import Snapshot
 from ngswell.run.digest import setup_digest
 from ngswell.setup.setup import Setup
+from ngswell.setup.snapshot import Snapshot
 from ngswell.stepping.steps import StepReport
 from ngswell.version import __version__
 
-FORMAT = 2
+FORMAT = 3
 """Number of the file format: what an entry is called and means."""
 
 
@@ -64,7 +64,7 @@ class Restart:
         """Write `path`, whole or not at all; raises OutputError."""
         header = {
             "format": FORMAT, "versions": self.versions, "begin": self.begin, "time": self.snapshot.time,
-            "seconds": self.seconds, "method": self.method, "digest": self.digest,
+            "meaning": dict(self.snapshot.meaning), "seconds": self.seconds, "method": self.method, "digest": self.digest,
             "observers": [name for name, _ in self.observers], "steps": [_as_list(step) for step in self.steps],
         }  # fmt: skip
         observers = {str(number): state for number, (_, state) in enumerate(self.observers)}
@@ -106,7 +106,7 @@ def read_checkpoint(path: str | Path) -> Restart:
 def _restart(header: dict[str, Any], tree: Tree, path: Path) -> Restart:
     observers = tree.get("observers", {})
     return Restart(
-        Snapshot(header["time"], tree["fields"]),
+        Snapshot(header["time"], tree["fields"], header["meaning"]),
         header["begin"],
         tuple(_step(entry) for entry in header["steps"]),
         header["seconds"],

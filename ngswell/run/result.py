@@ -6,8 +6,9 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
-from ngswell.problem.discretisation import Discretisation, Snapshot
+from ngswell.problem.discretisation import Discretisation
 from ngswell.setup.setup import Setup
+from ngswell.setup.snapshot import Snapshot
 from ngswell.stepping.steps import StepReport, why
 
 

@@ -16,7 +16,6 @@ from ngswell.analysis.overlap import warn_of_overlap
 from ngswell.baths.treatment import Charge
 from ngswell.errors import InputError, InstabilityError, StepError
 from ngswell.observers.base import Observer
-from ngswell.problem.discretisation import Snapshot
 from ngswell.problem.problem import Problem
 from ngswell.run.checkpoint import Checkpoint
 from ngswell.run.digest import canonical_text, setup_digest
@@ -27,6 +26,7 @@ from ngswell.run.signals import Signals, Stopped
 from ngswell.run.watch import Watch
 from ngswell.schedules import LARGEST
 from ngswell.setup.setup import Setup
+from ngswell.setup.snapshot import Snapshot
 from ngswell.solve.direct import LinearSolver, solver_of
 from ngswell.solve.newton import DampedNewton
 from ngswell.stepping.schemes import BACKWARD_EULER
@@ -178,7 +178,7 @@ class _Start:
             kept = checkpoint.read()
             resume = kept if resume is None else resume
         restart = resume if isinstance(resume, Restart) else None
-        snapshot = resume.snapshot if isinstance(resume, Restart) else resume
+        snapshot = resume.snapshot if isinstance(resume, Restart) else resume or setup.origin
         time = setup.start if snapshot is None else snapshot.time
         begin = time if restart is None else restart.begin
         until = checks.number("until", until, "s", -LARGEST, LARGEST)

@@ -23,6 +23,7 @@ from ngswell.physics.material import Material
 from ngswell.schedules import LARGEST, Ramp, Schedule
 from ngswell.setup.loads import Load
 from ngswell.setup.rigid_motions import check_determined
+from ngswell.setup.snapshot import Snapshot
 from ngswell.setup.supports import Support
 
 
@@ -32,7 +33,8 @@ class Setup:
 
     The body starts undeformed, in Donnan equilibrium with `initial` (salt concentration [mol/l] and hydraulic
     pressure [N/mm²]; by default that of its baths at `start`, which then have to agree). `charge` multiplies the
-    material's cfc0 over time. Raises InputError for anything that cannot be meant.
+    material's cfc0 over time. With an `origin`, which `Scene.after` sets, runs start from its fields instead. Raises
+    InputError for anything that cannot be meant.
     """
 
     mesh: Mesh
@@ -46,6 +48,7 @@ class Setup:
     start: float = 0.0  # [s]
     initial: tuple[float | None, float] | None = None
     mesh_shape: MeshShape = field(init=False, repr=False, compare=False)
+    origin: Snapshot | None = None
 
     def __post_init__(self) -> None:
         self._check_kinds()
@@ -90,6 +93,10 @@ class Setup:
             loads=checks.several("loads", self.loads, Load, "Traction or Weight"),
             start=checks.number("start", self.start, "s", -LARGEST, LARGEST),
         )
+        if self.origin is not None:
+            checks.instance("origin", self.origin, Snapshot, "a snapshot, such as `result.end`")
+            if self.origin.time != self.start:
+                raise InputError(f"origin is of {self.origin.time:g} s, but start = {self.start:g} s; they have to agree")
         if self.initial is not None:
             initial = checks.as_tuple(self.initial)
             if initial is None or len(initial) != 2:

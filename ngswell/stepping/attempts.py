@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ngswell.errors import Failure, Reason
-from ngswell.problem.discretisation import Snapshot
 from ngswell.problem.problem import Problem
+from ngswell.setup.snapshot import Snapshot
 from ngswell.solve.factorisation import Factorisation
 from ngswell.solve.newton import DampedNewton, Outcome
 from ngswell.stepping.schemes import Scheme

@@ -53,8 +53,8 @@ from ngswell import (
 )
 from ngswell.baths.treatment import Treatment
 from ngswell.closed_forms.homogeneous import homogeneous_equilibrium, lagged_column_factor
-from ngswell.problem.discretisation import Snapshot
 from ngswell.problem.problem import Problem
+from ngswell.setup.snapshot import Snapshot
 from studies.output import Findings, cost, letter_panels
 from studies.paper.oscillation import measured_growth
 from studies.scenes import BATH, quarter_block, rest_load

@@ -32,7 +32,7 @@ from ngswell import (
     Scene,
 )
 from ngswell.models.model import Model
-from ngswell.problem.discretisation import Snapshot
+from ngswell.setup.snapshot import Snapshot
 from ngswell.stepping.schemes import Scheme
 from studies.output import Findings, cost, letter_panels
 from studies.scenes import COLUMN_HEIGHT, END, FALLING, HEIGHT, INITIAL, confined_column, free_swelling_block, with_model

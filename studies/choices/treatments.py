@@ -73,8 +73,8 @@ from ngswell.mesh.points import integral_on_boundary
 from ngswell.models.model import Model
 from ngswell.observers.base import Observer
 from ngswell.physics import donnan
-from ngswell.problem.discretisation import Snapshot
 from ngswell.problem.problem import Problem
+from ngswell.setup.snapshot import Snapshot
 from ngswell.stepping.steps import Step
 from studies.output import Findings, cost, letter_panels
 from studies.paper.oscillation import STEP

@@ -27,7 +27,7 @@ from ngswell import (
 from ngswell.baths.treatment import Treatment
 from ngswell.models.model import Model
 from ngswell.observers.base import Observer
-from ngswell.problem.discretisation import Snapshot
+from ngswell.setup.snapshot import Snapshot
 from ngswell.stepping.steps import Control
 
 CHOICES: dict[str, tuple[Model, Treatment]] = {

@@ -18,8 +18,8 @@ from ngswell.baths.treatment import Treatment
 from ngswell.closed_forms.homogeneous import homogeneous_equilibrium
 from ngswell.mesh.points import points, vertices
 from ngswell.models.model import Model
-from ngswell.problem.discretisation import Snapshot
 from ngswell.schedules import Schedule
+from ngswell.setup.snapshot import Snapshot
 from studies.scenes import BATH, COLUMN_HEIGHT, confined_column, quarter_block, strip
 
 Choice = tuple[Model, Treatment]

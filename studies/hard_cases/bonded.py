@@ -31,7 +31,7 @@ from ngswell.baths.treatment import Treatment
 from ngswell.closed_forms.homogeneous import homogeneous_equilibrium
 from ngswell.models.model import Model
 from ngswell.physics.kinematics import Kinematics
-from ngswell.problem.discretisation import Snapshot
+from ngswell.setup.snapshot import Snapshot
 from studies.hard_cases.attempt import CHOICES, DEFAULTS, Attempt, attempt
 from studies.hard_cases.bodies import ACCURATE, AT_REST, directly, off
 from studies.scenes import BATH, P0

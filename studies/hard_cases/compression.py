@@ -11,7 +11,7 @@ from ngswell import TABLE_1, Adaptive, Fixed, Material, PowerLaw, Scene, Tractio
 from ngswell.baths.treatment import Treatment
 from ngswell.models.model import Model
 from ngswell.physics import donnan
-from ngswell.problem.discretisation import Snapshot
+from ngswell.setup.snapshot import Snapshot
 from studies.hard_cases.attempt import CHOICES, DEFAULTS, Attempt, attempt
 from studies.hard_cases.bodies import ACCURATE, AT_REST, Choice, directly, never, off
 from studies.scenes import BATH, confined_column, strip

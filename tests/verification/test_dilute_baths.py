@@ -24,7 +24,7 @@ from ngswell import (
 )
 from ngswell.closed_forms.homogeneous import homogeneous_equilibrium
 from ngswell.models import concentration
-from ngswell.problem.discretisation import Snapshot
+from ngswell.setup.snapshot import Snapshot
 from studies.hard_cases.bodies import block_scene
 from tests.scenes import P0, confined_column
 

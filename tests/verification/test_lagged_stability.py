@@ -25,7 +25,7 @@ from ngswell import (
 from ngswell.analysis.one_step import growth_factor, leading_eigenvalues
 from ngswell.closed_forms.homogeneous import homogeneous_equilibrium, lagged_column_factor
 from ngswell.physics import donnan
-from ngswell.problem.discretisation import Snapshot
+from ngswell.setup.snapshot import Snapshot
 from studies.paper.oscillation import measured_growth
 from studies.scenes import disturbed
 from tests.scenes import confined_column, quarter, strip

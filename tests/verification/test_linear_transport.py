@@ -39,7 +39,7 @@ from ngswell.closed_forms.linear_column import (
     uniform_gel_fluxes,
 )
 from ngswell.physics import donnan, laws
-from ngswell.problem.discretisation import Snapshot
+from ngswell.setup.snapshot import Snapshot
 from tests.scenes import P0, confined_column
 
 HEIGHT, BATH = 0.5, 0.15  # mm, mol/l

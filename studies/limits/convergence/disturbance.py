@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ngswell import TABLE_2, DampedNewton, Fixed, Probe, Scene, StepError
 from ngswell.closed_forms.homogeneous import homogeneous_equilibrium
-from ngswell.problem.discretisation import Snapshot
+from ngswell.setup.snapshot import Snapshot
 from studies.limits.convergence.spectra import CELL, held_sideways, swell
 from studies.scenes import with_noise
 

@@ -10,8 +10,8 @@ import numpy as np
 
 from ngswell import Area, DampedNewton, Fixed, Reason, Scene, StepError
 from ngswell.errors import Failure
-from ngswell.problem.discretisation import Snapshot
 from ngswell.problem.problem import Problem
+from ngswell.setup.snapshot import Snapshot
 from ngswell.solve.factorisation import Factorisation
 from ngswell.solve.newton import Outcome
 from ngswell.stepping.steps import Step
