@@ -4,17 +4,27 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import zipfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from glob import escape
 from pathlib import Path
 from typing import Any, TypeAlias
+from uuid import uuid4
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ngswell.checks import short
 from ngswell.errors import InputError, OutputError
+
+try:
+    import fcntl
+except ImportError:  # Windows
+    fcntl = None  # type: ignore[assignment]
+
+REMEDY = "what stood there before is unchanged. Free space on its disk, or write to another one"
 
 Tree: TypeAlias = dict[str, Any]
 """Arrays by name, in as many levels as their owners like: a value is an array or another Tree."""
@@ -24,10 +34,11 @@ Tree: TypeAlias = dict[str, Any]
 def replacing(path: Path, what: str) -> Iterator[Path]:
     """A name beside `path` to write to; what was written takes the place of `path` once it is complete and on the disk.
 
-    Raises OutputError, with the file of before as it was, where that fails. A process that is killed here leaves a file
-    ".NAME.new" at most, which the next one to write replaces.
+    A symbolic link stays: the file it leads to is replaced. Raises OutputError, with the file of before as it was, where
+    that fails. A process that is killed here leaves a file ".NAME.TOKEN.new", which `alone` clears away.
     """
-    new = path.with_name(f".{path.stem}.new{path.suffix}")
+    path = path.resolve()
+    new = path.with_name(f".{path.stem}.{uuid4().hex[:12]}.new{path.suffix}")
     try:
         yield new
         _to_disk(new, os.O_RDWR)
@@ -36,12 +47,57 @@ def replacing(path: Path, what: str) -> Iterator[Path]:
     except OutputError:
         raise
     except OSError as error:
-        raise OutputError(
-            f"{what}: {path} could not be written ({error.strerror or error}); what stood there before is unchanged. "
-            "Free space on its disk, or write to another one"
-        ) from error
+        raise OutputError(f"{what}: {path} could not be written ({error.strerror or error}); {REMEDY}") from error
     finally:
         new.unlink(missing_ok=True)
+
+
+@contextmanager
+def alone(path: Path, what: str, names: str | None = None) -> Iterator[None]:
+    """Nothing else writes `path` meanwhile, in no process or thread; raises OutputError if something does already.
+
+    The lock is the system's, on a file ".NAME.lock", and ends with the process, however that ends. Where the system or the
+    disk has no such locks, nothing is noticed. What a killed writer of `path` left half written, or of all files whose
+    names fit the pattern `names`, is cleared away.
+    """
+    path = path.resolve()
+    lock = path.with_name(f".{path.name}.lock")
+    held = _lock(lock, path, what)
+    try:
+        for file in path.parent.glob(f".{escape(path.stem)}*.new*"):
+            half_written = re.fullmatch(r"\.(.*)\.[0-9a-f]{12}\.new(\..*)?", file.name)
+            if half_written and re.fullmatch(names or re.escape(path.name), "".join(filter(None, half_written.groups()))):
+                file.unlink(missing_ok=True)
+        yield
+    finally:
+        lock.unlink(missing_ok=True)  # while it is held: who has opened it meanwhile looks whether it is still there
+        if held is not None:
+            os.close(held)
+
+
+def _lock(lock: Path, path: Path, what: str) -> int | None:
+    """The open file that holds a lock; None where there are no locks."""
+    while fcntl is not None:
+        try:
+            file = os.open(lock, os.O_RDWR | os.O_CREAT, 0o666)
+        except OSError as error:
+            raise OutputError(f"{what}: {path} could not be written ({error.strerror}); {REMEDY}") from error
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            if os.path.samestat(os.fstat(file), os.stat(lock)):
+                return file
+        except BlockingIOError:
+            os.close(file)
+            raise OutputError(
+                f"{what}: another run or observer is writing {path}; wait until it has ended, or choose another name"
+            ) from None
+        except FileNotFoundError:  # unlinked by the one that had it
+            pass
+        except OSError:
+            os.close(file)
+            return None
+        os.close(file)
+    return None
 
 
 def _to_disk(path: Path, flags: int) -> None:

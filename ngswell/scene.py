@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import pickle
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import Any
 
 from ngswell.analysis.one_step import Growth, growth_factor
 from ngswell.baths.bath import Bath
+from ngswell.errors import InputError
 from ngswell.observers.base import Observer
 from ngswell.problem.discretisation import Discretisation
 from ngswell.problem.problem import Problem
@@ -32,6 +34,18 @@ from ngswell.stepping.steps import Control
 @dataclass(frozen=True, kw_only=True)
 class Scene(Setup):
     __doc__ = Setup.__doc__
+
+    def __reduce__(self) -> tuple[Callable[[bytes], Scene], tuple[bytes]]:
+        """For other processes: the pieces, not what was made of them. Raises InputError for one that cannot be sent."""
+        pieces = {piece.name: getattr(self, piece.name) for piece in fields(self) if piece.init}
+        try:
+            return _unpickled, (pickle.dumps(pieces),)
+        except Exception:  # of pickle, of NGSolve, of a piece of the user's
+            name, error = next((name, error) for name, value in pieces.items() if (error := _misfit(value)))
+            raise InputError(
+                f"{name} of the scene cannot be sent to another process ({error}); functions have to be defined at the top "
+                "of a module, not as a lambda or inside another function, or make the scene in the process that runs it"
+            ) from None
 
     @property
     def problem(self) -> Problem:
@@ -149,3 +163,16 @@ class Scene(Setup):
         the present step.
         """
         return run(self, until, steps, observers, newton, resume, solver, checkpoint, unstable)
+
+
+def _unpickled(pieces: bytes) -> Scene:
+    return Scene(**pickle.loads(pieces))
+
+
+def _misfit(value: object) -> Exception | None:
+    """Why pickle does not take a value."""
+    try:
+        pickle.dumps(value)
+    except Exception as error:
+        return error
+    return None

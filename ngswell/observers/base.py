@@ -26,11 +26,14 @@ class Observer:
     4. `settings` for the base class, which with `when` tell observers of a class apart;
     5. `finish`, if something is left to do at the end.
 
-    A function of time [s] and state is an observer too: `observers=[lambda time, state: ...]`, see `Call`.
+    An observer records one run; a second one refuses it. A function of time [s] and state is an observer too:
+    `observers=[lambda time, state: ...]`, see `Call`.
     """
 
     watches_stability = False
     """Whether it tells itself that a state is unstable; a run then does not look."""
+    used = False
+    """Whether a run has started with it."""
 
     def __init__(self, when: float | Sequence[float] | None = None, *settings: object) -> None:
         self._when = When(type(self).__name__, when)

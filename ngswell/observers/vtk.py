@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from glob import escape
+import re
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
@@ -11,9 +12,12 @@ from ngsolve import CF, CoefficientFunction, VTKOutput
 
 from ngswell import checks
 from ngswell.errors import InputError, OutputError
-from ngswell.files import Tree, check_folder, replacing
+from ngswell.files import Tree, alone, check_folder, replacing
 from ngswell.observers.base import Observer
 from ngswell.problem.problem import Problem
+
+PIECE = r"_step\d{5,}"
+"""What the names of a series' pieces add to it, but for the first."""
 
 
 class VTK(Observer):
@@ -22,9 +26,9 @@ class VTK(Observer):
     All the model's quantities by default, or those named; fluxes and stresses, made of derivatives, mislead at baths, held
     sides and corners (docs/limits.md). Vectors have three components and stresses nine, as VTK readers
     expect. `subdivision` splits each element edge 2^n times, so that quadratic displacements show. Existing series are
-    kept unless `overwrite`; then the old series is removed as a whole. Raises OutputError before any computing, and
-    InputError on a 1-d mesh. At every moment the .pvd names complete pieces only; a resumed run replaces those beyond its
-    checkpoint.
+    kept unless `overwrite`; then the old series is removed as a whole, and no other file. One run writes a series at a
+    time. Raises OutputError before any computing, and InputError on a 1-d mesh. At every moment the .pvd names complete
+    pieces only; a resumed run replaces those beyond its checkpoint.
     """
 
     def __init__(
@@ -36,7 +40,10 @@ class VTK(Observer):
         overwrite: bool = False,
     ) -> None:
         self.path = checks.path("VTK", path, "out/swelling")
+        if re.search(rf"{PIECE}$", self.path.name):
+            raise InputError(f"VTK: {self.path.name!r} is what a piece of another series is called; choose another name")
         super().__init__(when, str(path), *quantities)
+        self._alone = ExitStack()
         for quantity in quantities:
             checks.name("VTK: a quantity", quantity, "displacement")
         subdivision = checks.integer("VTK: subdivision", subdivision, 0, 5)
@@ -53,18 +60,36 @@ class VTK(Observer):
         if "displacement" not in names:
             names.append("displacement")
         check_folder(self.path.parent, "VTK")
+        self._alone.enter_context(alone(self._series, "VTK", rf"{re.escape(self.path.name)}({PIECE})?\.(vtu|pvd)"))
         self._fields = {name: _three_dimensional(outputs[name]) for name in names}
 
     def start(self, problem: Problem, begin: float, until: float) -> None:
-        self.prepare(problem, begin, until)
-        self._recorded = []
-        pieces = [self._piece(0), *self.path.parent.glob(f"{escape(self.path.name)}_step*.vtu")]
-        old = [file for file in [self._series, *pieces] if file.exists()]
-        if old and not self.overwrite:
-            raise OutputError(f"VTK: {self._series} exists; choose another name or pass overwrite=True")
-        for file in old:
-            file.unlink()
-        self._record_if_due(problem, begin)
+        with self._let_go_on_errors():
+            self.prepare(problem, begin, until)
+            self._recorded = []
+            piece = re.compile(rf"{re.escape(self.path.name)}({PIECE})?\.vtu")
+            pieces = [file for file in self.path.parent.iterdir() if piece.fullmatch(file.name)]
+            old = [file for file in [self._series, *pieces] if file.exists()]
+            if old and not self.overwrite:
+                raise OutputError(f"VTK: {self._series} exists; choose another name or pass overwrite=True")
+            for file in old:
+                file.resolve().unlink()  # a link stays, and leads to what is written next
+            self._record_if_due(problem, begin)
+
+    def resume(self, problem: Problem, begin: float, until: float, state: Tree) -> None:
+        with self._let_go_on_errors():
+            super().resume(problem, begin, until, state)
+
+    @contextmanager
+    def _let_go_on_errors(self) -> Iterator[None]:
+        try:
+            yield
+        except BaseException:
+            self._alone.close()
+            raise
+
+    def finish(self, problem: Problem) -> None:
+        self._alone.close()
 
     def state(self) -> Tree:
         return {}  # the pieces are on the disk

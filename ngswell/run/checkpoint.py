@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from time import perf_counter
 
 from ngswell import checks
 from ngswell.errors import OutputError
-from ngswell.files import check_folder
+from ngswell.files import alone, check_folder
 from ngswell.observers.when import When
 from ngswell.run.restart import Restart, read_checkpoint
 
@@ -39,14 +40,21 @@ class Checkpoint:
         self._saved: float | None = None
         self._clock = 0.0
 
+    @contextmanager
+    def alone(self) -> Iterator[None]:
+        """No other run keeps its checkpoint there meanwhile. Raises OutputError for one that does, and for a folder that
+        cannot be written to."""
+        check_folder(self.path.resolve().parent, "Checkpoint")
+        if self.path.is_dir():
+            raise OutputError(f"Checkpoint: {self.path} is a folder; choose another name")
+        with alone(self.path, "Checkpoint"):
+            yield
+
     def read(self) -> Restart | None:
         """What the run is to go on from; None if there is no file yet, or if it is to be replaced.
 
-        Raises OutputError for a folder that cannot be written to, InputError for a file that is no checkpoint.
+        Raises InputError for a file that is no checkpoint.
         """
-        check_folder(self.path.parent, "Checkpoint")
-        if self.path.is_dir():
-            raise OutputError(f"Checkpoint: {self.path} is a folder; choose another name")
         return read_checkpoint(self.path) if self.path.exists() and not self.overwrite else None
 
     def request(self) -> None:

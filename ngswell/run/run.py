@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass
 from time import perf_counter
 from typing import Any
@@ -49,6 +50,21 @@ def run(
     """The run that `Scene.run` describes."""
     method = _Method.checked(setup, steps, newton, solver, unstable)
     watch = Watch(observers)
+    setup.check_unchanged()
+    if checkpoint is not None:
+        checks.instance("checkpoint", checkpoint, Checkpoint, "a Checkpoint(path)")
+    with nullcontext() if checkpoint is None else checkpoint.alone():
+        return _run(setup, until, method, watch, resume, checkpoint)
+
+
+def _run(
+    setup: Setup,
+    until: float,
+    method: _Method,
+    watch: Watch,
+    resume: Snapshot | Restart | None,
+    checkpoint: Checkpoint | None,
+) -> Result:
     start = _Start.checked(setup, until, resume, checkpoint, watch)
     method.check_first_step(start.begin, start.until)
     timetable, problem = start.timetable(setup, watch, checkpoint), Problem(setup)
@@ -174,7 +190,6 @@ class _Start:
             what = "a snapshot, such as `end` of an earlier result, or what read_checkpoint gives"
             checks.instance("resume", resume, (Snapshot, Restart), what)
         if checkpoint is not None:
-            checks.instance("checkpoint", checkpoint, Checkpoint, "a Checkpoint(path)")
             kept = checkpoint.read()
             resume = kept if resume is None else resume
         restart = resume if isinstance(resume, Restart) else None

@@ -7,7 +7,7 @@ from types import TracebackType
 from typing import Any
 
 from ngswell import checks
-from ngswell.errors import InstabilityError
+from ngswell.errors import InputError, InstabilityError
 from ngswell.files import Tree
 from ngswell.observers.base import Observer
 from ngswell.observers.call import Call
@@ -21,6 +21,12 @@ class Watch:
     def __init__(self, observers: Sequence[Observer | Callable[[float, Any], object]]) -> None:
         given = checks.several("observers", observers, (Observer, Callable), "observers, such as Probe(...), or functions")
         self.observers = [each if isinstance(each, Observer) else Call(each) for each in given]
+        for number, observer in enumerate(self.observers):
+            if observer.used or any(observer is other for other in self.observers[:number]):
+                raise InputError(
+                    f"observers: {checks.short(observer)} has records of a run already, or stands here twice; "
+                    "make a new one for each run"
+                )
         self._started: list[Observer] = []
         self._problem: Problem | None = None
 
@@ -39,6 +45,7 @@ class Watch:
                 observer.resume(problem, begin, until, next(states)[1])
             else:
                 observer.start(problem, time, until)
+            observer.used = True
             self._started.append(observer)
 
     def observe(self, step: Step) -> None:

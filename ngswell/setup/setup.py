@@ -6,14 +6,16 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+import numpy as np
 from ngsolve import CoefficientFunction, Mesh
+from numpy.typing import NDArray
 
 from ngswell import checks
 from ngswell.baths.bath import Bath, checked_salt, default_treatment
 from ngswell.baths.treatment import Prescribed, Treatment, Weak
 from ngswell.errors import InputError
 from ngswell.mesh.parts import Sides
-from ngswell.mesh.points import vertices_of
+from ngswell.mesh.points import points, vertices_of
 from ngswell.mesh.shape import MeshShape
 from ngswell.mesh.soundness import check_cells, check_sides
 from ngswell.models.model import Model
@@ -49,6 +51,7 @@ class Setup:
     initial: tuple[float | None, float] | None = None
     mesh_shape: MeshShape = field(init=False, repr=False, compare=False)
     origin: Snapshot | None = None
+    _made_with: dict[str, NDArray] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         self._check_kinds()
@@ -74,6 +77,7 @@ class Setup:
         for load in self.loads:
             load.check_in(self)
         self.initial_bath()  # refuses baths that differ at the start
+        checks.set_fields(self, _made_with=self._values())
 
     # -- checks --------------------------------------------------------------------------------------------------------
 
@@ -128,6 +132,26 @@ class Setup:
                     raise InputError(f"bath on {bath.boundary!r}: boundary {name!r} already has a bath")
                 taken.add(name)
             bath.check_in(self)
+
+    def _values(self) -> dict[str, NDArray]:
+        """Values of the fields of position, by what they belong to."""
+        where = points(self.mesh)
+        of_baths = {
+            f"a history of the bath on {bath.boundary!r}": history.at(self.start)
+            for bath in self.baths
+            for history in bath.schedules
+            if not history.uniform
+        }
+        fields = {**{f"the material's {name}": value for name, value in vars(self.material).items()}, **of_baths}
+        return {name: value(where) for name, value in fields.items() if isinstance(value, CoefficientFunction)}
+
+    def check_unchanged(self) -> None:
+        """Refuse fields of position, such as a Parameter, that have other values than when the setup was made."""
+        for name, values in self._values().items():
+            if not np.array_equal(values, self._made_with[name], equal_nan=True):
+                raise InputError(
+                    f"{name} has changed since the scene was made, which checked and used its values: make the scene anew"
+                )
 
     # -- what models, pieces and problems ask --------------------------------------------------------------------------
 
