@@ -35,9 +35,8 @@ def setup_digest(setup: Setup) -> dict[str, str]:
             for bath in setup.baths
         ]
     )
-    if setup.origin is not None:
-        numbers = sha256(np.ascontiguousarray(setup.origin.values).tobytes()).hexdigest()
-        texts["origin"] = repr((setup.origin.time, numbers))
+    origin = setup.origin
+    texts["origin"] = repr(origin and (origin.time, sha256(np.ascontiguousarray(origin.values).tobytes()).hexdigest()))
     return {name: sha256(text.encode()).hexdigest() for name, text in texts.items()}
 
 

@@ -19,4 +19,4 @@ class Snapshot:
 
     time: float
     values: NDArray
-    meaning: Mapping[str, str] = field(default_factory=dict, repr=False)
+    meaning: Mapping[str, str] | None = field(default=None, repr=False)

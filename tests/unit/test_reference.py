@@ -43,7 +43,7 @@ def described():
         words = isinstance(thing, type) and issubclass(thing, Enum)
         if callable(thing) and name != "Setup" and not words:  # Setup is described with Scene
             yield name, thing
-    for method in ("run", "equilibrate", "growth_factor", "state"):
+    for method in ("run", "after", "equilibrate", "growth_factor", "state"):
         yield f"Scene.{method}", getattr(Scene, method)
     yield "state.at", SolidState.at
     yield "on_deformed_body", plotting.on_deformed_body

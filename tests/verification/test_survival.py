@@ -97,7 +97,7 @@ def test_a_run_that_is_killed_again_and_again_ends_with_the_same_numbers(ballast
                 run.send_signal(signal.SIGKILL)
                 run.wait()
                 kills += 1
-                inside += any(file.name.startswith(".run") for file in folder.iterdir())
+                inside += any(file.name.startswith(".run.") and ".new" in file.name for file in folder.iterdir())
                 if (folder / "run").exists():
                     read_checkpoint(folder / "run")  # whole, whenever it was killed
                 if (folder / "series.pvd").exists():

@@ -200,10 +200,12 @@ def test_a_script_that_is_run_twice_goes_on_by_itself(tmp_path, one_thread):
     check_same(*script(halted, forgetful))
     assert (forgetful.begun, forgetful.seen) == (reached, [step.time for step in through.steps if step.time > reached])
     finished = file.read_bytes()
+    forgetful = Forgetful()
     check_same(*script(halted, forgetful))  # the run is over: nothing is computed
     assert (forgetful.begun, forgetful.seen) == (40.0, [])
     assert file.read_bytes() == finished
 
+    forgetful = Forgetful()
     check_same(*script(halted, forgetful, overwrite=True))
     assert (forgetful.begun, len(forgetful.seen)) == (0.0, len(through.steps))
     with pytest.raises(RuntimeError, match="halted"):
@@ -471,11 +473,11 @@ def test_other_versions(written, tmp_path, monkeypatch):
     with np.load(written) as archive:
         arrays = dict(archive)
     said = json.loads(arrays["header"].item())
-    assert said["format"] == 2
-    for other in (1, 3):
+    assert said["format"] == 3
+    for other in (2, 4):
         arrays["header"] = np.array(json.dumps({**said, "format": other, "fields": "elsewhere"}).encode())
         np.savez(tmp_path / "other.npz", **arrays)
-        with pytest.raises(InputError, match=rf"checkpoint format {other}.*reads 2; go on with the version that wrote it"):
+        with pytest.raises(InputError, match=rf"checkpoint format {other}.*reads 3; go on with the version that wrote it"):
             read_checkpoint(tmp_path / "other.npz")
     monkeypatch.setattr("ngswell.run.restart.__version__", "0.0.9")
     with pytest.raises(InputError, match=rf"written by {restart.versions}.*this is ngswell 0.0.9"):

@@ -46,7 +46,7 @@ def test_until_before_the_start():
 
 def test_a_snapshot_of_another_scene():
     end = confined_column().run(1.0, Fixed(1.0)).end
-    with pytest.raises(InputError, match="unknowns"):
+    with pytest.raises(InputError, match="another mesh"):
         strip().run(2.0, Fixed(1.0), resume=end)
 
 
