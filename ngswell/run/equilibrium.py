@@ -60,6 +60,7 @@ def equilibrate(
     for bath, treatment in setup.prescribed_baths:
         if treatment.charge_of is not Charge.PRESENT:
             raise InputError(f"equilibrate: the bath on {bath.boundary!r} remembers the past ({treatment})")
+    setup.check_unchanged()
     watch, problem, method = Watch(observers), Problem(setup), newton or DampedNewton()
     watch.plan(time, time)
     rest = _Rest(problem, time, method, Factorisation(solver(problem), method.slowest))

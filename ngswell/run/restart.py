@@ -64,8 +64,9 @@ class Restart:
         """Write `path`, whole or not at all; raises OutputError."""
         header = {
             "format": FORMAT, "versions": self.versions, "begin": self.begin, "time": self.snapshot.time,
-            "meaning": dict(self.snapshot.meaning or {}), "seconds": self.seconds, "method": self.method, "digest": self.digest,
-            "observers": [name for name, _ in self.observers], "steps": [_as_list(step) for step in self.steps],
+            "meaning": dict(self.snapshot.meaning or {}), "seconds": self.seconds, "method": self.method,
+            "digest": self.digest, "observers": [name for name, _ in self.observers],
+            "steps": [_as_list(step) for step in self.steps],
         }  # fmt: skip
         observers = {str(number): state for number, (_, state) in enumerate(self.observers)}
         write_tree(
