@@ -37,13 +37,13 @@ def replacing(path: Path, what: str) -> Iterator[Path]:
     A symbolic link stays: the file it leads to is replaced. Raises OutputError, with the file of before as it was, where
     that fails. A process that is killed here leaves a file ".NAME.TOKEN.new", which `alone` clears away.
     """
-    path = path.resolve()
-    new = path.with_name(f".{path.stem}.{uuid4().hex[:12]}.new{path.suffix}")
+    target = path.resolve()
+    new = target.with_name(f".{target.stem}.{uuid4().hex[:12]}.new{target.suffix}")
     try:
         yield new
         _to_disk(new, os.O_RDWR)
-        os.replace(new, path)
-        _to_disk(path.parent, os.O_RDONLY)
+        os.replace(new, target)
+        _to_disk(target.parent, os.O_RDONLY)
     except OutputError:
         raise
     except OSError as error:
@@ -60,13 +60,13 @@ def alone(path: Path, what: str, names: str | None = None) -> Iterator[None]:
     disk has no such locks, nothing is noticed. What a killed writer of `path` left half written, or of all files whose
     names fit the pattern `names`, is cleared away.
     """
-    path = path.resolve()
-    lock = path.with_name(f".{path.name}.lock")
+    target = path.resolve()
+    lock = target.with_name(f".{target.name}.lock")
     held = _lock(lock, path, what)
     try:
-        for file in path.parent.glob(f".{escape(path.stem)}*.new*"):
+        for file in target.parent.glob(f".{escape(target.stem)}*.new*"):
             half_written = re.fullmatch(r"\.(.*)\.[0-9a-f]{12}\.new(\..*)?", file.name)
-            if half_written and re.fullmatch(names or re.escape(path.name), "".join(filter(None, half_written.groups()))):
+            if half_written and re.fullmatch(names or re.escape(target.name), "".join(filter(None, half_written.groups()))):
                 file.unlink(missing_ok=True)
         yield
     finally:
