@@ -1,16 +1,29 @@
-"""Calls with the wrong arguments, refused like every other bad input."""
+"""Calls from outside: wrong arguments, refused like every other bad input, and warnings that name the caller's line."""
 
 from __future__ import annotations
 
 import inspect
+import sys
+import warnings
 from collections.abc import Callable
 from difflib import get_close_matches
 from functools import wraps
+from pathlib import Path
 from typing import Any, TypeVar
 
 from ngswell.errors import InputError
 
 Thing = TypeVar("Thing")
+
+_HERE = str(Path(__file__).parent)
+
+
+def warn(warning: Warning) -> None:
+    """Warn at the line outside the package from which it was called."""
+    frame, level = sys._getframe(1), 2
+    while frame.f_back is not None and frame.f_code.co_filename.startswith(_HERE):
+        frame, level = frame.f_back, level + 1
+    warnings.warn(warning, stacklevel=level)
 
 
 def refusing(thing: Thing) -> Thing:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass
 from itertools import combinations
 from math import pi
@@ -11,6 +10,7 @@ import numpy as np
 from ngsolve import VOL, ElementId
 from numpy.typing import NDArray
 
+from ngswell.calls import warn
 from ngswell.errors import OverlapWarning, place
 from ngswell.mesh.parts import Sides
 from ngswell.mesh.points import vertices
@@ -86,9 +86,8 @@ def warn_of_overlap(discretisation: Discretisation, snapshot: Snapshot) -> None:
     """Warn with OverlapWarning where the body overlaps itself at a snapshot."""
     found = overlap(discretisation, snapshot)
     if found is not None:
-        warnings.warn(
+        text = (
             f"at t = {snapshot.time:.10g} s {found}. Contact is not modelled: from where parts meet on, states are not "
-            "physical. Remedies: end the run before; a bath or supports with which they do not meet.",
-            OverlapWarning,
-            stacklevel=5,  # past run, Scene.run and what refuses its arguments
+            "physical. Remedies: end the run before; a bath or supports with which they do not meet."
         )
+        warn(OverlapWarning(text))

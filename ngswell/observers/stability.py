@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from math import inf
 
@@ -11,7 +10,8 @@ from numpy.typing import NDArray
 
 from ngswell.analysis.perturbations import Instability, Perturbations
 from ngswell.baths.treatment import Charge
-from ngswell.errors import REMEDIES, InputError, InstabilityError, Reason
+from ngswell.calls import warn
+from ngswell.errors import REMEDIES, InputError, InstabilityError, InstabilityWarning, Reason
 from ngswell.files import Tree
 from ngswell.observers.base import Observer
 from ngswell.problem.problem import Problem
@@ -90,7 +90,5 @@ class Stability(Observer):
     def finish(self, problem: Problem) -> None:
         if self._rates and self._rates[-1] > 0 and not self._stopped and self.last:
             at = f"t = {self._recorded[-1]:.10g} s"
-            warnings.warn(
-                f"Stability: the last state looked at, {at}, is unstable: {self.last}. {REMEDIES[Reason.UNSTABLE]}",
-                stacklevel=2,
-            )
+            text = f"Stability: the last state looked at, {at}, is unstable: {self.last}. {REMEDIES[Reason.UNSTABLE]}"
+            warn(InstabilityWarning(text))

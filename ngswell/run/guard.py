@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import warnings
-
 from ngswell import checks
 from ngswell.analysis.perturbations import Instability, Perturbations
 from ngswell.baths.treatment import Charge
+from ngswell.calls import warn
 from ngswell.errors import InstabilityError, InstabilityWarning, NgswellError
 from ngswell.observers.stability import FOLLOWED
 from ngswell.problem.problem import Problem
@@ -20,9 +19,6 @@ WORK = 400
 """Solves between two looks during a run, one with a new matrix counted as `MATRIX`. A look costs a hundredth of them."""
 
 MATRIX = 4
-
-CALLER = 6
-"""Frames from the warning to whoever called the method of a scene."""
 
 
 class Guard:
@@ -78,7 +74,7 @@ class Guard:
                 found = Perturbations(self._problem, self._solver).fastest(self._slowest)
             except NgswellError as error:
                 text = f"whether the state at t = {time:.10g} s is stable could not be told: {error}"
-                warnings.warn(InstabilityWarning(text), stacklevel=CALLER - 1)
+                warn(InstabilityWarning(text))
         self._solver.factorisations, self._solver.solves = counts
         if found is not None:
             self._tell(time, 0.0, found)
@@ -97,4 +93,4 @@ class Guard:
         error.end = self._problem.snapshot(time)
         if answer == "error":
             raise error
-        warnings.warn(InstabilityWarning(f"{error.said} {error.failure.remedy}"), stacklevel=CALLER)
+        warn(InstabilityWarning(f"{error.said} {error.failure.remedy}"))

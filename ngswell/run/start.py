@@ -1,0 +1,75 @@
+"""Where a run starts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ngswell import checks
+from ngswell.errors import InputError
+from ngswell.problem.problem import Problem
+from ngswell.run.checkpoint import Checkpoint
+from ngswell.run.restart import Restart
+from ngswell.run.watch import Watch
+from ngswell.schedules import LARGEST
+from ngswell.setup.setup import Setup
+from ngswell.setup.snapshot import Snapshot
+from ngswell.stepping.timetable import Timetable, same_time
+
+
+@dataclass(frozen=True)
+class Start:
+    """Where a run starts: at the setup's start, from a snapshot, or in the midst of an earlier run."""
+
+    begin: float  # of the whole run [s]
+    time: float  # from where it is computed now [s]
+    until: float
+    snapshot: Snapshot | None
+    restart: Restart | None
+
+    @classmethod
+    def checked(
+        cls,
+        setup: Setup,
+        until: float,
+        resume: Snapshot | Restart | None,
+        checkpoint: Checkpoint | None,
+        watch: Watch,
+    ) -> Start:
+        if resume is not None:
+            what = "a snapshot, such as `end` of an earlier result, or what read_checkpoint gives"
+            checks.instance("resume", resume, (Snapshot, Restart), what)
+        if checkpoint is not None:
+            kept = checkpoint.read()
+            resume = kept if resume is None else resume
+        restart = resume if isinstance(resume, Restart) else None
+        snapshot = resume.snapshot if isinstance(resume, Restart) else resume or setup.origin
+        time = setup.start if snapshot is None else snapshot.time
+        begin = time if restart is None else restart.begin
+        until = checks.number("until", until, "s", -LARGEST, LARGEST)
+        if not begin < until or same_time(begin, until):
+            raise InputError(f"until = {until:.17g} s is not a time after the start at {begin:.17g} s")
+        if not time <= until:
+            raise InputError(f"until = {until:g} s is before the checkpoint, {time:g} s")
+        if checkpoint is not None:
+            checkpoint.check(restart)
+        if restart is not None:
+            restart.check(setup, watch.observers)
+        return cls(begin, time, until, snapshot, restart)
+
+    def timetable(self, setup: Setup, watch: Watch, checkpoint: Checkpoint | None) -> Timetable:
+        """What the steps have to land on."""
+        span = self.begin, self.until
+        stops = [*watch.plan(*span), *(checkpoint.plan(*span) if checkpoint else ())]
+        return Timetable.of(*span, [kink for history in setup.schedules for kink in history.kinks], stops)
+
+    @property
+    def remembered(self) -> tuple:
+        return () if self.restart is None else self.restart.observers
+
+    def apply(self, problem: Problem) -> None:
+        """Put the fields where the run starts."""
+        if self.snapshot is not None:
+            problem.check("resume", self.snapshot)
+        problem.initialise()
+        if self.snapshot is not None:
+            problem.restore(self.snapshot)
