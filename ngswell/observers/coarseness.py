@@ -58,8 +58,6 @@ class Coarseness(Observer):
         self._at: dict[str, NDArray] = {}
 
     def prepare(self, problem: Problem, begin: float, until: float) -> None:
-        if self._mesh not in (None, problem.mesh):
-            raise InputError("Coarseness: it holds the cells of another mesh; take a new one for each mesh")
         self._mesh = problem.mesh
         self._recovery = Recovery(problem)
 

@@ -241,7 +241,7 @@ def run(trial: Trial) -> str:
         try:
             scene = Scene(**trial.scene)
             newton = DampedNewton() if trial.exact else None
-            end = scene.run(trial.until, trial.steps, [ledger, watch], newton=newton).end
+            end = scene.run(trial.until, trial.steps, [ledger, watch], newton=newton, unstable="off").end
             outcome = "finished"
         except InputError:
             return "refused"

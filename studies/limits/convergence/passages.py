@@ -173,7 +173,7 @@ def approached(variant: str, cells: tuple[int, int], intervals: Intervals) -> Sn
     scene = as_variant(free_swelling_block(*cells), variant)
     state = scene.equilibrate(INITIAL)
     for until, step in intervals:
-        state = scene.run(until, Fixed(step), resume=state).end
+        state = scene.run(until, Fixed(step), resume=state, unstable="off").end
     return state
 
 
@@ -186,5 +186,5 @@ def passage(plan: Plan) -> Passage:
     counter = _Counter()
     watched = Watched(method=Undamped() if plan.undamped else DampedNewton(), clock=counter)
     with suppress(StepError, _GivenUp):
-        scene.run(plan.until, Fixed(plan.step), [counter], newton=watched, resume=state)
+        scene.run(plan.until, Fixed(plan.step), [counter], newton=watched, resume=state, unstable="off")
     return Passage(plan, scene, counter.last.time, counter.iterations, counter.steps, watched.failures, counter.last)
