@@ -74,7 +74,7 @@ class Scene(Setup):
         """The next part of a test: this scene with other pieces, which starts from where `end` leaves the body.
 
             swollen = scene.run(3600)
-            pressed = scene.after(swollen, start=0.0, loads=[Pressing("top", Ramp((0, 0.0), (10, 0.05)))]).run(600)
+            diluted = scene.after(swollen, start=0.0, baths=[Bath("top", c=Ramp((0, 0.15), (10, 0.1)))]).run(600)
 
         `end` is a result or a snapshot of this scene, such as its state of rest. Pieces that are not given stay. Times go
         on from those of `end`; with `start=0.0` the clock of the new part starts at zero, and histories count from now.

@@ -10,7 +10,6 @@ from netgen.meshing import NgException
 from numpy.typing import NDArray
 
 from ngswell.analysis.perturbations import Perturbations
-from ngswell.baths.treatment import Charge
 from ngswell.errors import UNCONVERGED, Failure, NgswellError, Reason, place
 from ngswell.mesh.points import vertices
 from ngswell.problem.forms import form
@@ -50,7 +49,7 @@ def explain(problem: Problem, snapshot: Snapshot, dt: float, failure: Failure, d
     A singular system, or a state that is unstable within the `duration` [s] of the run. Not for baths that look back one
     step, whose states have a map of their own, nor for systems too large for a factorisation, which the caller spares.
     """
-    if any(treatment.charge_of is Charge.LAST_STEP for _, treatment in problem.setup.prescribed_baths):
+    if problem.setup.looks_back:
         return None
     problem.restore(snapshot)
     problem.begin_step(snapshot.time + dt, dt)
@@ -81,10 +80,11 @@ def imbalance(problem: Problem) -> tuple[float, tuple[float, ...]]:
     the vertex [mm] where it is largest: at rest, what Newton's method leaves."""
     force = problem.fields.vec.CreateVector()
     u = problem.ranges[problem.names[0]]
+    free = np.array(list(problem.free), dtype=float)[u]
     left, largest = np.zeros(problem.vector.size), 0.0
     for term in problem.terms:
         form(problem, [term], 0.0).Apply(problem.fields.vec, force)
-        share = force.FV().NumPy()[u] * np.array(list(problem.free), dtype=float)[u]
+        share = force.FV().NumPy()[u] * free
         left[u] += share
         largest = max(largest, float(np.abs(share).max()))
     return (float(np.abs(left).max()) / largest if largest else 0.0), problem.worst(left)[1]

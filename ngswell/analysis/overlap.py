@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import combinations
 from math import pi
 
 import numpy as np
@@ -12,7 +11,6 @@ from numpy.typing import NDArray
 
 from ngswell.calls import warn
 from ngswell.errors import OverlapWarning, place
-from ngswell.mesh.parts import Sides
 from ngswell.mesh.points import vertices
 from ngswell.problem.discretisation import Discretisation
 from ngswell.setup.snapshot import Snapshot
@@ -52,12 +50,11 @@ def overlap(discretisation: Discretisation, snapshot: Snapshot) -> Overlap | Non
         return None
     reference = vertices(mesh)
     deformed = reference + discretisation.vertex_values(snapshot.values, discretisation.names[0]).T
-    sides = Sides(mesh)
+    sides = discretisation.setup.sides
     behind = [[vertex.nr for vertex in mesh[ElementId(VOL, cell)].vertices] for cell in sides.behind.tolist()]
     centres, moved = (np.array([places[cell].mean(axis=0) for cell in behind]) for places in (reference, deformed))
-    pieces = [(side, piece) for side, these in enumerate(sides.corners) for piece in combinations(these, dim)]
-    corners, owner = np.array([piece for _, piece in pieces]), np.array([side for side, _ in pieces])
-    # Of four corners, in any order, all four triangles: together they cover the side twice.
+    owner, corners = sides.simplices
+    # The triangles of four corners cover their side twice.
     shares = np.array([0.5 if len(these) == 4 else 1.0 for these in sides.corners])[owner]
     outward = np.sign(np.linalg.det(reference[corners] - centres[owner, None]))
     step = 1 + len(moved) * len(corners) // MOST_PAIRS

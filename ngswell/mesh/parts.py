@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
-from itertools import chain
+from itertools import chain, combinations
 
 import numpy as np
 from ngsolve import EDGE, FACE, VERTEX, VOL, Mesh, NodeId
@@ -37,6 +37,13 @@ class Sides:
         if kind is VERTEX:
             return [[number] for number in self.free.tolist()]
         return [[vertex.nr for vertex in self.mesh[NodeId(kind, number)].vertices] for number in self.free.tolist()]
+
+    @cached_property
+    def simplices(self) -> tuple[NDArray, NDArray]:
+        """Segments or triangles that cover the free sides: the side's position, and vertices. Four corners may come in any
+        order: all four triangles of three of them, which cover the side twice."""
+        pieces = [(side, piece) for side, these in enumerate(self.corners) for piece in combinations(these, self.mesh.dim)]
+        return np.array([side for side, _ in pieces]), np.array([piece for _, piece in pieces])
 
     @cached_property
     def parts(self) -> list[NDArray]:

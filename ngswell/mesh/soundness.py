@@ -108,16 +108,13 @@ class _Surface:
     """The sides of one cell alone, in simplices, and the points that may lie on none of the others: corners and middles."""
 
     def __init__(self, sides: Sides) -> None:
-        dim = sides.mesh.dim
         numbers = sorted({number for corners in sides.corners for number in corners})
         row = {number: index for index, number in enumerate(numbers)}
         corners = [[row[number] for number in these] for these in sides.corners]
         places = np.array([sides.mesh[NodeId(VERTEX, number)].point for number in numbers])
         self.vertices, round_off = len(numbers), 1e-13 * float(np.ptp(places, axis=0).max())
-        # Four corners may come in any order: all four triangles of three of them.
-        pieces = [(side, piece) for side, these in enumerate(corners) for piece in combinations(these, dim)]
-        self.side = np.array([side for side, _ in pieces])
-        self.simplices = np.array([piece for _, piece in pieces])
+        self.side, pieces = sides.simplices
+        self.simplices = np.searchsorted(numbers, pieces)
         self.corners = np.array([(these + these[:1] * 4)[:4] for these in corners])
         middles = np.array([places[these].mean(axis=0) for these in corners])
         self.points = np.concatenate([places, middles])

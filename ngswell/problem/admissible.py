@@ -9,7 +9,6 @@ import numpy as np
 from ngsolve import CF, CoefficientFunction, x, y, z
 from numpy.typing import NDArray
 
-from ngswell.baths.treatment import Charge
 from ngswell.errors import Reason
 from ngswell.mesh.points import corners
 from ngswell.problem.discretisation import Discretisation
@@ -47,7 +46,7 @@ class Admissible:
         """None where a bath takes the charge of the last step: it may oscillate and drive anions below zero, and whoever
         chooses it wants to see that."""
         problem = self._discretisation
-        if any(treatment.charge_of is Charge.LAST_STEP for _, treatment in problem.setup.prescribed_baths):
+        if problem.setup.looks_back:
             return {}
         return _compiled(problem.model.solution_bounds(self._state))
 

@@ -10,8 +10,8 @@ from ngsolve import BND, CF, H1, VOL, BitArray, Compress, FESpace, GridFunction
 from numpy.typing import NDArray
 
 from ngswell import checks
-from ngswell.errors import InputError
-from ngswell.mesh.points import digest, points, vertices
+from ngswell.errors import InputError, place
+from ngswell.mesh.points import points, vertices
 from ngswell.models.model import BathFields, FieldContext
 from ngswell.setup.setup import Setup
 from ngswell.setup.snapshot import Snapshot
@@ -97,7 +97,7 @@ class Discretisation:
         spans = [f"{name} {part.start}:{part.stop}" for name, part in self.ranges.items()]
         multipliers = [bath.boundary for bath, treatment in self.setup.weak_baths if treatment.multipliers]
         return {
-            "mesh": f"{self.mesh.ne} cells, {self.mesh.nv} vertices, {digest(self.mesh)[:12]}",
+            "mesh": f"{self.mesh.ne} cells, {self.mesh.nv} vertices, {self.setup.mesh_digest[:12]}",
             "kinematics": type(self.kinematics).__name__,
             "model": f"{type(self.model).__name__} of order {self.model.order}",
             "unknowns": ", ".join(spans) + (f", multipliers on {'|'.join(multipliers)}" if multipliers else ""),
@@ -117,10 +117,10 @@ class Discretisation:
         displaced = np.abs(snapshot.values[self._held])
         if displaced.size and not displaced.max() <= ROUND_OFF * self.references[self.names[0]]:
             worst = int(np.argmax(np.where(np.isfinite(displaced), displaced, np.inf)))
-            place = ", ".join(f"{value:.4g}" for value in self._place(int(self._held[worst])))
+            where = self._place(int(self._held[worst]))
             raise InputError(
-                f"{what}: the snapshot displaces the body by {displaced[worst]:.3g} mm near ({place}) mm, where a support "
-                "of the scene holds it; a support can hold only what has not moved there"
+                f"{what}: the snapshot displaces the body by {displaced[worst]:.3g} mm near {place(where)} mm, where a "
+                "support of the scene holds it; a support can hold only what has not moved there"
             )
 
     @cached_property

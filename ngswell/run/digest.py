@@ -10,7 +10,7 @@ import numpy as np
 from ngsolve import CF, VOL, CoefficientFunction
 from numpy.typing import NDArray
 
-from ngswell.mesh.points import digest, points
+from ngswell.mesh.points import points
 from ngswell.physics.material import Material
 from ngswell.physics.solid import nominal_stress
 from ngswell.setup.setup import Setup
@@ -26,7 +26,7 @@ def setup_digest(setup: Setup) -> dict[str, str]:
     mesh = setup.mesh
     inside = points(mesh, VOL, 4)
     texts = {name: canonical_text(getattr(setup, name), inside) for name in _PARTS}
-    texts["mesh"] = digest(mesh)
+    texts["mesh"] = setup.mesh_digest
     texts["material"] += repr(setup.material.samples) + _solid_samples(setup.material, inside)
     texts["baths"] = repr(
         [

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from ngswell import checks
 from ngswell.analysis.perturbations import Instability, Perturbations
-from ngswell.baths.treatment import Charge
 from ngswell.calls import warn
 from ngswell.errors import InstabilityError, InstabilityWarning, NgswellError
 from ngswell.observers.stability import FOLLOWED
@@ -28,8 +27,9 @@ class Guard:
     """
 
     def __init__(self, answer: str, watch: Watch, problem: Problem, solver: LinearSolver, duration: float) -> None:
-        looks_back = any(treatment.charge_of is Charge.LAST_STEP for _, treatment in problem.setup.prescribed_baths)
-        quiet = answer == "off" or looks_back or any(observer.watches_stability for observer in watch.observers)
+        quiet = (
+            answer == "off" or problem.setup.looks_back or any(observer.watches_stability for observer in watch.observers)
+        )
         self._answer = "off" if quiet else answer
         self._problem, self._solver, self._slowest = problem, solver, 1 / duration
         self._perturbations: Perturbations | None = None
@@ -70,8 +70,9 @@ class Guard:
         counts = self._solver.factorisations, self._solver.solves
         found = None
         if self._doubtful(self._slowest):
+            assert self._perturbations is not None
             try:
-                found = Perturbations(self._problem, self._solver).fastest(self._slowest)
+                found = self._perturbations.fastest(self._slowest)
             except NgswellError as error:
                 text = f"whether the state at t = {time:.10g} s is stable could not be told: {error}"
                 warn(InstabilityWarning(text))

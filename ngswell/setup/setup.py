@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from ngsolve import CoefficientFunction, Mesh
@@ -12,10 +13,10 @@ from numpy.typing import NDArray
 
 from ngswell import checks
 from ngswell.baths.bath import Bath, checked_salt, default_treatment
-from ngswell.baths.treatment import Prescribed, Treatment, Weak
+from ngswell.baths.treatment import Charge, Prescribed, Treatment, Weak
 from ngswell.errors import InputError
 from ngswell.mesh.parts import Sides
-from ngswell.mesh.points import points, vertices_of
+from ngswell.mesh.points import digest, points, vertices_of
 from ngswell.mesh.shape import MeshShape
 from ngswell.mesh.soundness import check_cells, check_sides
 from ngswell.models.model import Model
@@ -50,6 +51,7 @@ class Setup:
     start: float = 0.0  # [s]
     initial: tuple[float | None, float] | None = None
     mesh_shape: MeshShape = field(init=False, repr=False, compare=False)
+    sides: Sides = field(init=False, repr=False, compare=False)
     origin: Snapshot | None = None
     _made_with: dict[str, NDArray] = field(init=False, repr=False, compare=False)
 
@@ -61,8 +63,8 @@ class Setup:
             )
         checks.set_fields(self, mesh_shape=MeshShape.of(self.mesh))
         check_cells(self.mesh)
-        sides = Sides(self.mesh)
-        check_sides(sides)
+        checks.set_fields(self, sides=Sides(self.mesh))
+        check_sides(self.sides)
         self.material.check_on(self.mesh)
         self.model.check(self.material, self.baths)
         for value in self.charge.values:
@@ -73,7 +75,7 @@ class Setup:
             support.check_in(self)
         self.kinematics.check(self.mesh, self.fixed())
         wet = {number for bath in self.baths for number in vertices_of(self.mesh, bath.boundary)}
-        check_determined(self.mesh, sides.parts, self.kinematics, self.fixed(), self.pins(), wet)
+        check_determined(self.mesh, self.sides.parts, self.kinematics, self.fixed(), self.pins(), wet)
         for load in self.loads:
             load.check_in(self)
         self.initial_bath()  # refuses baths that differ at the start
@@ -182,6 +184,16 @@ class Setup:
         """Baths whose treatment prescribes values."""
         treated = ((bath, self.treatment(bath)) for bath in self.baths)
         return [(bath, treatment) for bath, treatment in treated if isinstance(treatment, Prescribed)]
+
+    @property
+    def looks_back(self) -> bool:
+        """Whether a bath takes the charge of the last step: its states have a map of their own from step to step."""
+        return any(treatment.charge_of is Charge.LAST_STEP for _, treatment in self.prescribed_baths)
+
+    @cached_property
+    def mesh_digest(self) -> str:
+        """What tells its mesh from another, in every process."""
+        return digest(self.mesh)
 
     @property
     def fluid_weight(self) -> tuple[float, ...] | None:
