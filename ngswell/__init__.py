@@ -1,7 +1,8 @@
 """Swelling of charged hydrated porous media on NGSolve. Units mm, N, s, K, mol/l.
 
-Folders, each importing only from those above it: errors, calls, checks, files, schedules · mesh · physics · models · baths ·
-setup · problem · solve · stepping · analysis · observers · run · scene; closed_forms and plotting stand beside them.
+Folders, each importing only from those above it: errors, calls, checks, files, schedules, histories · mesh · physics ·
+models · baths · setup · problem · solve · stepping · analysis · observers · run · scene. Beside them stand closed_forms and
+plotting.
 """
 
 from __future__ import annotations
@@ -27,6 +28,7 @@ from ngswell.errors import (
     Reason,
     StepError,
 )
+from ngswell.histories import Sine, Spline
 from ngswell.mesh.gmsh import read_mesh
 from ngswell.mesh.shapes import box, column, from_occ, rectangle
 from ngswell.mesh.soundness import check_mesh
@@ -71,9 +73,9 @@ __all__ = [
     "LeastSquares", "Ledger", "Load", "LocalDonnan", "MackieMeares", "Material", "Multiplier", "NeoHookean",
     "NgswellError", "Nitsche", "Observer", "Outflow", "OutputError", "OverlapWarning", "Penalty", "Pin", "PlaneStrain",
     "Potential", "PowerLaw", "Prescribed", "Probe", "Problem", "Progress", "Ramp", "Reason", "Restart", "Result", "Role",
-    "Roller", "Scene", "Setup", "Snapshot", "Snapshots", "Spatial", "Stability", "StepError", "Support", "Symmetry",
-    "Term", "Traction", "TwoLevelSolver", "Uncharged", "Weak", "Weight", "box", "check_mesh", "column", "from_occ",
-    "read_checkpoint", "read_mesh", "rectangle",
+    "Roller", "Scene", "Setup", "Sine", "Snapshot", "Snapshots", "Spatial", "Spline", "Stability", "StepError", "Support",
+    "Symmetry", "Term", "Traction", "TwoLevelSolver", "Uncharged", "Weak", "Weight", "box", "check_mesh", "column",
+    "from_occ", "read_checkpoint", "read_mesh", "rectangle",
 ]  # fmt: skip
 
 for _name in __all__:

@@ -9,6 +9,7 @@ from bisect import bisect_right
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
+from math import inf
 from typing import Protocol, cast, runtime_checkable
 
 import numpy as np
@@ -21,6 +22,12 @@ from ngswell.errors import InputError
 
 LARGEST = 1e15
 """Times and values beyond this are none that a history can mean."""
+
+BEND = 1e-2
+"""A point off the line through its neighbours by at most this share of its history's range is a bend, beyond that a kink."""
+
+STRAIGHT = 1e-9
+"""A point off that line by at most this share lies on it: round-off of decimal times and values, and below any tolerance."""
 
 
 @dataclass(frozen=True)
@@ -35,15 +42,19 @@ class Signal:
 class Schedule(Protocol):
     """A value over time. A history of one's own gives, numbered:
 
-    1. `kinks`, the times at which it bends [s]: steps land on them and forget their past there;
-    2. `values`, all that it passes, for refusals and natural sizes;
-    3. `at`, its value at a time, and `uniform`, whether that is one number for all places;
-    4. `signal`, its form in a run;
-    5. `check_on`, its refusals once the places are known.
+    1. `kinks`, the times at which its slope jumps [s]: steps land on them and start anew there;
+    2. `bends`, times at which steps have to land but go on as before: small kinks, and what a long step could miss;
+    3. `values`, all that it passes, for refusals and natural sizes;
+    4. `at`, its value at a time, and `uniform`, whether that is one number for all places;
+    5. `signal`, its form in a run;
+    6. `check_on`, its refusals once the places are known.
     """
 
     @property
     def kinks(self) -> tuple[float, ...]: ...
+
+    @property
+    def bends(self) -> tuple[float, ...]: ...
 
     @property
     def values(self) -> tuple[float, ...]: ...
@@ -64,25 +75,16 @@ class Schedule(Protocol):
 class Ramp:
     """Piecewise linear in time through (time [s], value) points, constant before the first and after the last.
 
-    `Ramp((7000, 4.1), (7080, 2.7))`; one point is a constant. Raises InputError for times that do not increase.
+    `Ramp((7000, 4.1), (7080, 2.7))`; one point is a constant. Points on a straight line are neither kinks nor bends. Raises
+    InputError for times that do not increase.
     """
 
     times: tuple[float, ...]
     values: tuple[float, ...]
 
     def __init__(self, *points: tuple[float, float]) -> None:
-        if not points:
-            raise InputError("Ramp needs at least one (time, value) point")
-        pairs = [checks.vector("Ramp: a (time, value) point", point, LARGEST) for point in points]
-        for pair in pairs:
-            if len(pair) != 2:
-                raise InputError(f"Ramp takes points (time, value), Ramp((0, 1.0), (60, 2.0)), got {checks.short(pair)}")
-        times, values = (tuple(column) for column in zip(*pairs, strict=True))
-        for before, after in pairwise(times):
-            if after <= before:
-                raise InputError(f"Ramp times have to increase, but {after:g} s follows {before:g} s")
-        object.__setattr__(self, "times", times)
-        object.__setattr__(self, "values", values)
+        times, values = through("Ramp", points)
+        checks.set_fields(self, times=times, values=values)
 
     uniform = True
 
@@ -91,7 +93,25 @@ class Ramp:
 
     @property
     def kinks(self) -> tuple[float, ...]:
-        return self.times if len(self.times) > 1 else ()
+        return self._points_off_line(BEND, inf)
+
+    @property
+    def bends(self) -> tuple[float, ...]:
+        return self._points_off_line(STRAIGHT, BEND)
+
+    def _points_off_line(self, least: float, most: float) -> tuple[float, ...]:
+        """Times [s] of points that are off the line through their neighbours by `least` to `most` of the range of values.
+
+        That is the jump of the slope times a b/(a + b), a and b the times to the neighbours; infinite beyond the ends.
+        """
+        span = max(self.values) - min(self.values)
+        if span == 0:
+            return ()
+        durations = np.diff(self.times)
+        jumps = np.diff([0.0, *np.diff(self.values) / durations, 0.0])
+        frequencies = np.array([0.0, *1 / durations, 0.0])
+        off = np.abs(jumps) / (frequencies[:-1] + frequencies[1:]) / span
+        return tuple(time for time, share in zip(self.times, off, strict=True) if least < share <= most)
 
     def at(self, time: float) -> float:
         """Value at `time` [s]."""
@@ -136,6 +156,10 @@ class Blend:
         return tuple(sorted({*self.first.kinks, *self.second.kinks}))
 
     @property
+    def bends(self) -> tuple[float, ...]:
+        return tuple(sorted({*self.first.bends, *self.second.bends}))
+
+    @property
     def values(self) -> tuple[float, ...]:
         return self.first.values + self.second.values
 
@@ -154,11 +178,26 @@ class Blend:
         return Signal((1 - self.weight) * first.field + self.weight * second.field, move)
 
 
+def through(what: str, points: tuple[tuple[float, float], ...]) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Times and values of (time [s], value) points. InputError for what are none, and for times that do not increase."""
+    if not points:
+        raise InputError(f"{what} needs at least one (time, value) point")
+    pairs = [checks.vector(f"{what}: a (time, value) point", point, LARGEST) for point in points]
+    for pair in pairs:
+        if len(pair) != 2:
+            raise InputError(f"{what} takes points (time, value), {what}((0, 1.0), (60, 2.0)), got {checks.short(pair)}")
+    times, values = (tuple(column) for column in zip(*pairs, strict=True))
+    for before, after in pairwise(times):
+        if after <= before:
+            raise InputError(f"{what} times have to increase, but {after:g} s follows {before:g} s")
+    return times, values
+
+
 def schedule(what: str, value: float | Schedule) -> Schedule:
     """A number as a constant Ramp; schedules pass through. InputError for `what` is neither."""
     if checks.is_a(value, Schedule):
         return cast(Schedule, value)
-    return Ramp((0.0, checks.number(what, value, hint="or a history, Ramp(...) or Blend(...)")))
+    return Ramp((0.0, checks.number(what, value, hint="or a history, Ramp(...), Sine(...), Spline(...) or Blend(...)")))
 
 
 class Clock:

@@ -60,6 +60,7 @@ class Start:
         """What the steps have to land on."""
         span = self.begin, self.until
         stops = [*watch.plan(*span), *(checkpoint.plan(*span) if checkpoint else ())]
+        stops += [bend for history in setup.schedules for bend in history.bends]
         return Timetable.of(*span, [kink for history in setup.schedules for kink in history.kinks], stops)
 
     @property

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from math import inf
 from typing import Any, TypeVar
 
 from ngswell import checks
@@ -58,8 +59,9 @@ def _constant(history: Schedule) -> bool:
 
 def _check_ahead(name: str, history: Schedule, start: float) -> None:
     """Refuse a history that is over before it begins."""
-    if history.kinks and max(history.kinks) <= start:
+    end = max((*history.kinks, *history.bends), default=inf)
+    if end <= start:
         raise InputError(
-            f"after: {name}: a history ends at {max(history.kinks):g} s, but this part starts at {start:g} s; give times on "
+            f"after: {name}: a history ends at {end:g} s, but this part starts at {start:g} s; give times on "
             "the clock of the part before, or start=0.0 to count from now; for what stays as it is one number is enough"
         )

@@ -1,4 +1,4 @@
-"""When a run has to be where: its begin and end, the kinks of its histories, the times that observers ask for."""
+"""When a run has to be where: its begin and end, kinks and bends of its histories, the times that observers ask for."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def same_time(a: float, b: float) -> bool:
 
 @dataclass(frozen=True)
 class Timetable:
-    """Times of a run [s], each list sorted. The error estimate forgets its past at `kinks`; `stops` are only landed on."""
+    """Times of a run [s], each list sorted. Steps start anew at `kinks`; `stops` are only landed on."""
 
     begin: float
     end: float
