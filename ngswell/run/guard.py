@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from statistics import median
+
 from ngswell import checks
 from ngswell.analysis.perturbations import Instability, Perturbations
 from ngswell.calls import warn
@@ -9,7 +11,9 @@ from ngswell.errors import InstabilityError, InstabilityWarning, NgswellError
 from ngswell.observers.stability import FOLLOWED
 from ngswell.problem.problem import Problem
 from ngswell.run.watch import Watch
+from ngswell.setup.snapshot import Snapshot
 from ngswell.solve.direct import LinearSolver
+from ngswell.stepping.steps import Step
 
 ANSWERS = ("warn", "error", "off")
 """What a state past the limit of stability is answered with."""
@@ -18,6 +22,10 @@ WORK = 400
 """Solves between two looks during a run, one with a new matrix counted as `MATRIX`. A look costs a hundredth of them."""
 
 MATRIX = 4
+
+HARD = 3
+"""A step with so many times the usual iterations may have left a state that had lost its stability for another: a body that
+buckles or wrinkles within one step. A look at the state before costs less than the iterations that were too many."""
 
 
 class Guard:
@@ -34,6 +42,8 @@ class Guard:
         self._problem, self._solver, self._slowest = problem, solver, 1 / duration
         self._perturbations: Perturbations | None = None
         self._looked = self._work()
+        self._before: Snapshot | None = None  # what the next step starts from
+        self._iterations: list[int] = []
 
     @staticmethod
     def check(what: str, answer: str) -> None:
@@ -43,25 +53,34 @@ class Guard:
     def _work(self) -> int:
         return self._solver.solves + MATRIX * self._solver.factorisations
 
-    def after_step(self, time: float) -> None:
-        """Now and then during a run: whether growth is lost, faster than the stages just taken follow.
-
-        The matrix that the last step was solved with tells: K(σ) at σ of one over a stage.
-        """
-        if self._answer == "off" or self._work() < self._looked + WORK or not self._solver.direct:
+    def after_step(self, step: Step, accepted: Snapshot) -> None:
+        """Now and then during a run, and where a step was hard: whether growth is lost, faster than stages follow."""
+        if self._answer == "off" or not self._solver.direct:
             return
-        self._looked = self._work()
-        solves = self._solver.solves  # the run's own
-        doubtful = self._doubtful(None)
-        self._solver.solves = solves
-        if doubtful:
-            try:
-                found = Perturbations(self._problem).fastest(self._slowest)
-            except NgswellError:
-                return  # the look at the end tells
-            stage = self._problem.dt.Get()
-            if found is not None and found.rate * stage > FOLLOWED:
-                self._tell(time, stage, found)
+        hard = len(self._iterations) > 2 and step.iterations > HARD * median(self._iterations)
+        self._iterations = [*self._iterations[-20:], step.iterations]
+        stage = self._problem.dt.Get()
+        if hard and self._before is not None:
+            self._problem.restore(self._before)
+            self._look(self._before.time, stage)
+            self._problem.restore(accepted)
+        elif self._work() >= self._looked + WORK:
+            solves = self._solver.solves  # the run's own
+            doubtful = self._doubtful(None)  # K(σ) of the matrix that the last step was solved with, σ of one over a stage
+            self._solver.solves = solves
+            if doubtful:
+                self._look(accepted.time, stage)
+            self._looked = self._work()
+        self._before = accepted
+
+    def _look(self, time: float, stage: float) -> None:
+        """Tell of growth that stages of size `stage` [s] lose; where it cannot be told, the look at the end does."""
+        try:
+            found = Perturbations(self._problem).fastest(self._slowest)
+        except NgswellError:
+            return
+        if found is not None and found.rate * stage > FOLLOWED:
+            self._tell(time, stage, found)
 
     def at_end(self, time: float) -> None:
         """Whether a perturbation grows by a factor e in as long as the run took; its matrix is a new one."""

@@ -77,7 +77,7 @@ def _run(
             for step in signals.until_received(stepper):
                 log.reports.append(step.report())
                 watch.observe(step)
-                guard.after_step(step.time)
+                guard.after_step(step, stepper.accepted)
                 if checkpoint:
                     checkpoint.after(step.time, log.restart)
         except BaseException as error:
@@ -86,7 +86,7 @@ def _run(
                 checkpoint.save(log.restart)
             if isinstance(error, Failed):
                 raise _step_error(error, problem, stepper) from None
-            if isinstance(error, StepError):
+            if isinstance(error, StepError) and error.end is None:
                 error.end = stepper.accepted
             if not isinstance(error, Stopped):
                 raise

@@ -88,10 +88,12 @@ def attempt(
     start: Callable[[Scene], Snapshot] | None = None,
     newton: DampedNewton | None = None,
     ledger_bound: float = 1e-7,
+    says: type[Warning] | None = None,
 ) -> Attempt:
     """Make a scene, run it to `until` [s] (from the snapshot that `start` gives, if any), and judge what comes of it.
 
-    `error` takes the scene and the result. Its `bound` needs a reason.
+    `error` takes the scene and the result. Its `bound` needs a reason. A run that `says` with a warning of that kind what is
+    amiss has no error, and the warning for its message.
     """
     ledger = Ledger()
     with warnings.catch_warnings(record=True) as caught:
@@ -109,7 +111,8 @@ def attempt(
             return Attempt(case, variant, outcome, measure, time=stopped.time, message=fault or str(stopped))
         except NgswellError as refused:
             return Attempt(case, variant, "refused", measure, message=str(refused))
-    found, open_by = float(error(scene, result)), max(ledger.imbalance().values())
+    told = [str(one.message) for one in caught if says is not None and issubclass(one.category, says)]
+    found, open_by = 0.0 if told else float(error(scene, result)), max(ledger.imbalance().values())
     fault = unusable(scene, result.end, until) or missed(found, bound, open_by, ledger_bound)
     return Attempt(
         case,
@@ -124,7 +127,7 @@ def attempt(
         result.iterations,
         result.seconds,
         until,
-        fault,
+        fault or " ".join(told),
         tuple(dict.fromkeys(str(warning.message) for warning in caught)),
     )
 
