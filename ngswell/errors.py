@@ -33,6 +33,7 @@ class Reason(Enum):
 
     NOT_ADMISSIBLE_AT_START = "the state at the start of the step has {what} not positive"
     NOT_ADMISSIBLE = "{what} would not stay positive"
+    IONS_RUN_OUT = "ions run out: {what} would not stay positive"
     TURNS_OVER = "a cell would turn over: {what} would not stay positive"
     NOT_A_SOLUTION = "{what} is not positive in the solution"
     STALLED = "Newton's method stalls: no damped step reduces the correction"
@@ -42,6 +43,9 @@ class Reason(Enum):
     ESTIMATE_NOT_FINITE = "the estimated error is not finite"
     ERROR_ABOVE_TOLERANCE = "error above the tolerance"
     OUT_OF_BALANCE = "the start is out of balance: {what}"
+    LOADED_AT_ONCE = "the load is sudden: {what}"
+    CHARGE_OUTRUNS_SALT = "the charge rises faster than salt diffuses in: {what}"
+    OSCILLATES = "a bath takes the charge of the last step, and oscillates: {what}"
     UNSTABLE = "the state is unstable: {what}"
 
     def text(self, what: str = "") -> str:
@@ -49,48 +53,68 @@ class Reason(Enum):
         return self.value.format(what=what)
 
 
-_SQUEEZED = "Remedies: a smaller or slower load or change of the bath, a finer mesh there."
+_SQUEEZED = "Remedies: a smaller load or change of the bath. Without charge and λ nothing bears more than µ (1 − nS0²)/nS0."
+
 _LOST = (
-    "Remedies: a gentler ramp, a finer mesh where the field is worst, a weaker penalty; the surface of a gel that is held "
-    "sideways and swells beyond J = 2.5 may wrinkle."
+    "Remedies: a smaller or slower load or change of the bath; if `newton` was given, run without it; if `solver` was "
+    "given, the direct one; a law of your own that is smooth and finite."
 )
 
 _TURNED = (
-    "Remedies: a smaller or slower load or change of the bath. At the edge where a held side meets a free one the strain is "
+    "Remedies: a smaller load or change of the bath. At the edge where a held side meets a free one the strain is "
     "singular, and cells that are very fine there fold: coarser cells at that edge, or an edge that is rounded."
 )
 
 REMEDIES = {
     Reason.NOT_ADMISSIBLE_AT_START: (
-        "Remedies: go on from an accepted state, `result.end`, `error.end` or a checkpoint; an initial bath and charge that "
-        "the body can have."
+        "Remedies: go on from an accepted state, `result.end`, `error.end` or a checkpoint; a state that was changed by "
+        "hand has to stay within what the body can have."
     ),
     Reason.NOT_ADMISSIBLE: _SQUEEZED,
+    Reason.IONS_RUN_OUT: (
+        "Remedies: a bath that changes more slowly, and not from nearly pure water; from nearly pure water, Concentration() "
+        "with Penalty or Multiplier."
+    ),
     Reason.TURNS_OVER: _TURNED,
     Reason.NOT_A_SOLUTION: (
-        "Remedies: Penalty or Multiplier in place of Nitsche; where anions are few, a slower change of bath or charge, "
-        "finer cells at the bath; Potential(), whose ions cannot be negative."
+        "Remedies: Penalty or Multiplier in place of Nitsche; where anions are few, a slower change of bath or charge."
     ),
     Reason.STALLED: _LOST,
     Reason.TOO_MANY_ITERATIONS: _LOST,
     Reason.SINGULAR: _LOST,
     Reason.ESTIMATE_NOT_FINITE: _LOST,
     Reason.UNDETERMINED: "Remedies: a support for what can move, a bath or a free side for a pressure.",
-    Reason.ERROR_ABOVE_TOLERANCE: "Remedies: a larger tolerance, a gentler ramp, a finer mesh where the field is worst.",
-    Reason.OUT_OF_BALANCE: (
-        "Remedies: a charge that is raised in time, charge=Ramp((0, 0), (4000, 1)); a start at rest, "
-        "resume=scene.equilibrate(); a traction that carries the pressure of the charged body; where the sudden load is "
-        "meant, finer cells at the baths."
+    Reason.ERROR_ABOVE_TOLERANCE: (
+        "Remedies: a history of your own that does not jump, or names the times at which it bends (`kinks`); a larger "
+        "tolerance, Adaptive(1e-2); Fixed steps, which estimate no error."
     ),
+    Reason.OUT_OF_BALANCE: (
+        "Remedies: a start at rest, resume=scene.equilibrate(); a charge that is raised in time, "
+        "charge=Ramp((0, 0), (T, 1)), T as long as salt takes to diffuse in; a traction that carries the pressure of the "
+        "charged body; where the sudden release is meant, finer cells at the baths, grade={...}."
+    ),
+    Reason.LOADED_AT_ONCE: (
+        "Remedies: a smaller load; Confined, which neither bends nor wrinkles, bears more. Without charge and λ nothing "
+        "bears more than µ (1 − nS0²)/nS0."
+    ),
+    Reason.CHARGE_OUTRUNS_SALT: (
+        "Remedies: charge=Ramp((0, 0), (T, 1)) with T at least as long as that; or start with the charge and at rest, "
+        "without the ramp: resume=scene.equilibrate(). A sealed body needs a bath."
+    ),
+    Reason.OSCILLATES: "Remedies: a treatment of the present charge, as Penalty(1.0) or the default; not shorter steps.",
     Reason.UNSTABLE: (
         "Remedies: to let it grow, an imperfection that seeds it, steps well below that time and Stability(follow=True); to "
-        "avoid it, a bath of more salt, a surface that is held, or Confined, which leaves wrinkles out."
+        "avoid it, a smaller load; in a gel that swells, a bath of more salt; a surface that is held, or Confined, which "
+        "leaves wrinkles out."
     ),
 }
 """What helps against each reason."""
 
 UNCONVERGED = frozenset({Reason.STALLED, Reason.TOO_MANY_ITERATIONS, Reason.SINGULAR, Reason.ESTIMATE_NOT_FINITE})
 """Reasons that say nothing about the cause yet."""
+
+OF_IONS = frozenset({Reason.IONS_RUN_OUT, Reason.NOT_A_SOLUTION})
+"""Reasons that are about ions alone: forces out of balance do not explain them."""
 
 
 @dataclass(frozen=True)

@@ -9,16 +9,13 @@ import numpy as np
 from netgen.meshing import NgException
 from numpy.typing import NDArray
 
+from ngswell.analysis.causes import imbalance, oscillating, outrun
 from ngswell.analysis.perturbations import Perturbations
-from ngswell.errors import UNCONVERGED, Failure, NgswellError, Reason, place
+from ngswell.errors import OF_IONS, UNCONVERGED, Failure, NgswellError, Reason, place
 from ngswell.mesh.points import vertices
-from ngswell.problem.forms import form
 from ngswell.problem.problem import Problem
 from ngswell.setup.rigid_motions import name_of_motion, rigid_motions
 from ngswell.setup.snapshot import Snapshot
-
-BALANCED = 1e-2
-"""Share of the largest force that a state at rest leaves at most; Newton's tolerance leaves far less."""
 
 NONE_LEFT = 1e-10
 """A mode counts as a null vector when no row of its product exceeds this share of what the row's entries could add up to."""
@@ -43,14 +40,19 @@ class Undetermined:
         return Failure(Reason.UNDETERMINED, self.field, self.where, self.text)
 
 
-def explain(problem: Problem, snapshot: Snapshot, dt: float, failure: Failure, duration: float) -> Failure | None:
+def explain(
+    problem: Problem, snapshot: Snapshot, dt: float, failure: Failure, duration: float, first: bool
+) -> Failure | None:
     """What the state at `snapshot` says of a step of `dt` [s] from it that failed; None if nothing.
 
-    A singular system, or a state that is unstable within the `duration` [s] of the run. Not for baths that look back one
-    step, whose states have a map of their own, nor for systems too large for a factorisation, which the caller spares.
+    A singular system, a bath that oscillates, a charge that rises too fast, a `first` state whose forces do not balance, or
+    a state that is unstable within the `duration` [s] of the run. Not for systems too large for a factorisation, which the
+    caller spares.
     """
-    if problem.setup.looks_back:
+    if failure.reason is Reason.NOT_ADMISSIBLE_AT_START:
         return None
+    if problem.setup.looks_back:  # states have a map of their own
+        return oscillating(problem, snapshot, dt)
     problem.restore(snapshot)
     problem.begin_step(snapshot.time + dt, dt)
     found = singular_mode(problem)
@@ -58,10 +60,11 @@ def explain(problem: Problem, snapshot: Snapshot, dt: float, failure: Failure, d
     # Without fluid, the ions of a cell are undetermined too: that does not explain why fluid runs out.
     if found is not None and (failure.reason in UNCONVERGED or found.kind is not Undetermined.Kind.LOCAL):
         return found.failure
-    left, where = imbalance(problem)
-    if left > BALANCED:  # what is not at rest has no stability
-        said = f"the forces on the body leave {left:.0%} of the largest of them, most near {place(where)} mm"
-        return Failure(Reason.OUT_OF_BALANCE, "u", where, said)
+    if failure.reason in OF_IONS:
+        return outrun(problem, snapshot, dt, failure)
+    out_of_balance = imbalance(problem) if first else None  # what is not at rest has no stability
+    if out_of_balance is not None:
+        return out_of_balance
     try:
         unstable = Perturbations(problem).fastest(1 / duration)
     except NgswellError:
@@ -73,21 +76,6 @@ def folded(problem: Problem) -> Failure | None:
     """Where the present state has a corner of a cell turned over, squeezed or not: its next steps may fail for that."""
     found = problem.admissible.turned(fluid=1.0)
     return None if found is None else Failure(found.reason, found.what, found.where, found.what)
-
-
-def imbalance(problem: Problem) -> tuple[float, tuple[float, ...]]:
-    """What the forces of the present state leave at the displacements that are free, as a share of the largest of them, and
-    the vertex [mm] where it is largest: at rest, what Newton's method leaves."""
-    force = problem.fields.vec.CreateVector()
-    u = problem.ranges[problem.names[0]]
-    free = np.array(list(problem.free), dtype=float)[u]
-    left, largest = np.zeros(problem.vector.size), 0.0
-    for term in problem.terms:
-        form(problem, [term], 0.0).Apply(problem.fields.vec, force)
-        share = force.FV().NumPy()[u] * free
-        left[u] += share
-        largest = max(largest, float(np.abs(share).max()))
-    return (float(np.abs(left).max()) / largest if largest else 0.0), problem.worst(left)[1]
 
 
 def singular_mode(problem: Problem) -> Undetermined | None:

@@ -38,8 +38,12 @@ class Admissible:
     @cached_property
     def always(self) -> dict[str, CoefficientFunction]:
         """At the forms' own points, where laws are evaluated."""
-        content = {"fluid content J − nS0": self._state.content}
-        return _compiled(content | self._discretisation.model.bounds(self._state))
+        return _compiled({"fluid content J − nS0": self._state.content}) | self.of_ions
+
+    @cached_property
+    def of_ions(self) -> dict[str, CoefficientFunction]:
+        """The model's own among these."""
+        return _compiled(self._discretisation.model.bounds(self._state))
 
     @cached_property
     def in_solutions(self) -> dict[str, CoefficientFunction]:
@@ -57,7 +61,8 @@ class Admissible:
             values = field(points).ravel()
             worst = int(np.argmin(np.where(np.isfinite(values), values, -np.inf)))
             if not values[worst] > 0:
-                return Violation(name, self._place(points[worst : worst + 1]), Reason.NOT_ADMISSIBLE)
+                reason = Reason.IONS_RUN_OUT if name in self.of_ions else Reason.NOT_ADMISSIBLE
+                return Violation(name, self._place(points[worst : worst + 1]), reason)
         return None if solution else self.turned()
 
     def turned(self, fluid: float = SQUEEZED) -> Violation | None:

@@ -85,7 +85,7 @@ def _run(
             if checkpoint and (signals.stepping or isinstance(error, InstabilityError)):  # observers agree on the last step
                 checkpoint.save(log.restart)
             if isinstance(error, Failed):
-                raise _step_error(error, problem, stepper) from None
+                raise _step_error(error, problem, stepper, start.time) from None
             if isinstance(error, StepError) and error.end is None:
                 error.end = stepper.accepted
             if not isinstance(error, Stopped):
@@ -100,11 +100,11 @@ def _run(
     return log.result(setup)
 
 
-def _step_error(failed: Failed, problem: Problem, stepper: Stepper) -> StepError:
-    """A failed step with what the last accepted state says of it."""
-    cause = None
+def _step_error(failed: Failed, problem: Problem, stepper: Stepper, start: float) -> StepError:
+    """A failed step with what the last accepted state says of it, of a run from `start` [s]."""
+    cause, first = None, stepper.accepted.time == start
     if stepper.factorisation.solver.direct:  # else too large for a factorisation
-        cause = explain(problem, stepper.accepted, failed.tried, failed.failure, stepper.timetable.duration)
+        cause = explain(problem, stepper.accepted, failed.tried, failed.failure, stepper.timetable.duration, first)
     return StepError(failed.time, failed.dt, failed.failure, cause, end=stepper.accepted)
 
 

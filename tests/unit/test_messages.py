@@ -56,7 +56,7 @@ def test_every_exception_is_on_the_page():
     [
         ("Newton's method stalls", "Newton's method gets stuck", ["STALLED"]),
         ("(`UNSTABLE`)", "", ["UNSTABLE"]),
-        ("| a larger tolerance, a gentler ramp, a finer mesh |", "| |", ["ERROR_ABOVE_TOLERANCE"]),
+        ("| name the kink; a larger tolerance; `Fixed` steps |", "| |", ["ERROR_ABOVE_TOLERANCE"]),
     ],
 )
 def test_a_reason_that_is_not_listed_is_noticed(right, wrong, lost):

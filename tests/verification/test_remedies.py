@@ -1,0 +1,330 @@
+"""Each reason why a run stops: a small case that stops with it, and the remedies of its message, run on that case."""
+
+import re
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+from ngsolve import Parameter, sqrt
+
+from ngswell import (
+    BACKWARD_EULER,
+    TABLE_1,
+    TABLE_2,
+    Adaptive,
+    Axisymmetric,
+    Bath,
+    Concentration,
+    Confined,
+    DampedNewton,
+    Fixed,
+    InstabilityError,
+    Lagged,
+    Penalty,
+    PlaneStrain,
+    Potential,
+    Ramp,
+    Roller,
+    Scene,
+    Stability,
+    StepError,
+    Symmetry,
+    Traction,
+    Uncharged,
+    column,
+    rectangle,
+)
+from ngswell.errors import REMEDIES, Reason
+from ngswell.physics import donnan
+from ngswell.schedules import Schedule, Signal
+from ngswell.solve.direct import LinearSolver
+from tests.scenes import UNCHARGED, confined_column, strip
+
+
+def body(**changes):
+    """A quarter of a square of Table 1, 3 × 2 cells, wet above and beside."""
+    fields = {
+        "mesh": rectangle(1.0, 1.0, 3, 2),
+        "kinematics": PlaneStrain(),
+        "material": TABLE_1,
+        "supports": [Symmetry("left"), Symmetry("bottom")],
+        "baths": [Bath("top|right", c=0.15)],
+    }
+    return Scene(**fields | changes)
+
+
+def gel(c, **changes):
+    """A confined column of 10 cells without load."""
+    return confined_column(changes.pop("treatment", None), c, 10, loads=[], **changes)
+
+
+def pressed(load, **changes):
+    return body(**{"model": Uncharged(), "material": UNCHARGED, "baths": [Bath("top|right")], "loads": down(load)} | changes)
+
+
+def down(load):
+    return [Traction("top", (0.0, -load))]
+
+
+COVERED: set[Reason] = set()
+"""Reasons that a case below stops with."""
+
+
+def stops(reason, run):
+    """The error with which `run` stops, for this reason and with its remedies."""
+    with pytest.raises(StepError, match=r"Remedies: ") as caught:
+        run()
+    assert caught.value.reason is reason
+    assert str(caught.value).endswith(REMEDIES[reason])
+    return caught.value
+
+
+def case(*reasons):
+    COVERED.update(reasons)
+    return lambda test: test
+
+
+def test_every_reason_has_a_case():
+    assert set(Reason) == COVERED
+
+
+# -- charge --------------------------------------------------------------------------------------------------------------
+
+
+BONDED = {"material": TABLE_2, "supports": [Roller("bottom", "xy"), Symmetry("left")]}
+
+
+@case(Reason.OUT_OF_BALANCE)
+def test_a_first_charged_scene_is_told_of_its_start():
+    error = stops(Reason.OUT_OF_BALANCE, lambda: body(**BONDED).run(100.0))
+    assert "imperfection" not in str(error)
+    assert "more salt" not in str(error)
+    scene = body(**BONDED)
+    scene.run(100.0, resume=scene.equilibrate(unstable="off"), unstable="off")
+    body(charge=Ramp((0, 0), (1e5, 1)), **BONDED).run(1.1e5, Adaptive(1e-2), unstable="off")
+    pressure = donnan.pressure(0.15, TABLE_2.number("cfc0"), TABLE_2.RT)
+    carried = [Traction("top", (0.0, -pressure)), Traction("right", (-pressure, 0.0))]
+    body(loads=carried, **BONDED).run(100.0, unstable="off")
+
+
+def test_a_sudden_release_takes_finer_cells():
+    loose = [Roller("bottom", "xy")]
+    stops(Reason.OUT_OF_BALANCE, lambda: body(supports=loose).run(100.0))
+    fine = rectangle(1.0, 1.0, 6, 6, grade={"top": 30, "right": 30})
+    body(mesh=fine, supports=loose).run(100.0, Adaptive(1e-2), unstable="off")
+
+
+def disc(model, **changes):
+    """Of 14 mm, in little salt."""
+    return body(
+        **{"mesh": rectangle(7.0, 2.0, 4, 2), "kinematics": Axisymmetric(), "material": TABLE_2, "model": model} | changes
+    )
+
+
+@case(Reason.CHARGE_OUTRUNS_SALT)
+@pytest.mark.parametrize("model", [Potential(), Concentration()], ids=str)
+@pytest.mark.parametrize(("make", "too_fast"), [(body, 10.0), (disc, 1000.0)])
+def test_a_charge_that_rises_too_fast_is_told_of_its_ramp(make, too_fast, model):
+    def raised(within):
+        scene = make(model=model, charge=Ramp((0, 0), (within, 1)))
+        return scene.run(1.1 * within, Adaptive(1e-2), unstable="off")
+
+    error = stops(Reason.CHARGE_OUTRUNS_SALT, lambda: raised(too_fast))
+    assert "load" not in str(error)
+    enough = float(re.search(r"that takes some (\d+) s here", str(error))[1])
+    assert too_fast < enough
+    raised(enough)
+    scene = make(model=model)
+    scene.run(100.0, resume=scene.equilibrate(unstable="off"), unstable="off")
+
+
+@pytest.mark.parametrize("model", [Potential(), Concentration()], ids=str)
+def test_a_sealed_body_has_no_salt_for_its_charge(model):
+    fields = {"model": model, "charge": Ramp((0, 0), (1000, 1))}
+    error = stops(Reason.CHARGE_OUTRUNS_SALT, lambda: body(baths=[], initial=(0.15, 0.0), **fields).run(2000.0))
+    assert "no bath gives any" in str(error)
+    body(**fields).run(2000.0)
+
+
+# -- salt ----------------------------------------------------------------------------------------------------------------
+
+
+@case(Reason.IONS_RUN_OUT)
+def test_a_bath_that_rises_from_nearly_pure_water():
+    stops(Reason.IONS_RUN_OUT, lambda: gel(Ramp((0, 1e-9), (1, 5.0)), model=Potential()).run(1e4))
+    gel(Ramp((0, 1e-3), (1e4, 5.0)), model=Potential()).run(2e4)
+    gel(5.0, model=Concentration(), initial=(1e-9, 0.0)).run(1e4)
+
+
+@case(Reason.NOT_A_SOLUTION)
+def test_anions_below_zero():
+    stops(Reason.NOT_A_SOLUTION, lambda: gel(Ramp((0, 1e-9), (1, 5.0)), model=Concentration()).run(1e4))
+    gel(Ramp((0, 1e-9), (1e4, 5.0)), model=Concentration()).run(1e4)
+
+
+# -- loads ---------------------------------------------------------------------------------------------------------------
+
+
+@case(Reason.LOADED_AT_ONCE)
+def test_a_sudden_load_is_told_of_the_load():
+    error = stops(Reason.LOADED_AT_ONCE, lambda: pressed(5.0).run(100.0))
+    assert "charge that is raised" not in str(error)
+    pressed(0.1).run(100.0)
+    along = {"mesh": column(1.0, 3), "kinematics": Confined(), "supports": [Roller("bottom", "x")], "baths": [Bath("top")]}
+    pressed(5.0, **along, loads=[Traction("top", (-5.0,))]).run(100.0)
+
+
+@case(Reason.NOT_ADMISSIBLE)
+def test_more_than_a_body_bears():
+    """Confined, without charge and λ: µ (1 − nS0²)/nS0 and no more, which the message says."""
+    soft = replace(TABLE_1, cfc0=0.0, lam=0.0)
+    most = 0.24 * (1 - 0.25**2) / 0.25
+    stops(Reason.NOT_ADMISSIBLE, lambda: strip(material=soft, loads=down(1.01 * most)).equilibrate())
+    strip(material=soft, loads=down(0.99 * most)).equilibrate(unstable="off")
+
+
+@case(Reason.TURNS_OVER)
+def test_cells_that_fold_at_a_bonded_edge():
+    def fine_at_the_edge(grade):
+        mesh = rectangle(1.0, 1.0, 8, 8, grade={"bottom": grade, "right": grade})
+        return body(mesh=mesh, supports=[Roller("bottom", "xy"), Symmetry("left")])
+
+    stops(Reason.TURNS_OVER, fine_at_the_edge(400.0).equilibrate)
+    fine_at_the_edge(25.0).equilibrate()
+
+
+@case(Reason.UNSTABLE)
+def test_an_unstable_body_is_told_of_its_load_or_its_bath():
+    stops(Reason.UNSTABLE, lambda: pressed(1.0).run(100.0, unstable="off"))
+    pressed(0.1).run(100.0)
+    layer = {
+        "mesh": rectangle(0.3, 0.2, 6, 4),
+        "material": TABLE_2,
+        "supports": [Roller("bottom", "xy"), Roller("left|right", "x")],
+    }
+
+    def film(c, **changes):
+        return body(**{**layer, "charge": Ramp((0, 0), (1e4, 1)), "baths": [Bath("top", c=c)], **changes})
+
+    def watched(scene, *observers):
+        return lambda: scene.run(3e4, Adaptive(1e-2), observers, unstable="error")
+
+    for observers in ((), (Stability(),)):
+        assert isinstance(stops(Reason.UNSTABLE, watched(film(0.05), *observers)), InstabilityError)
+    watched(film(0.5), Stability())()
+    thin = {"mesh": column(0.2, 6), "kinematics": Confined(), "supports": [Roller("bottom", "x")]}
+    watched(film(0.05, **thin), Stability())()
+
+
+# -- numbers -------------------------------------------------------------------------------------------------------------
+
+
+@case(Reason.NOT_ADMISSIBLE_AT_START)
+def test_a_state_made_by_hand():
+    scene = gel(Ramp((0, 0.15), (10, 0.125)), model=Potential(), charge=Ramp((0, 0), (1000, 1)))
+    end = scene.run(100.0).end
+    squeezed = end.values.copy()
+    squeezed[scene.problem.ranges["u"]] -= np.linspace(0, 0.9, scene.problem.ranges["u"].stop)
+    squeezed[~np.array(list(scene.problem.free))] = end.values[~np.array(list(scene.problem.free))]
+    stops(Reason.NOT_ADMISSIBLE_AT_START, lambda: scene.run(200.0, resume=replace(end, values=squeezed)))
+    scene.run(200.0, resume=end)
+
+
+SLOW = {"charge": Ramp((0, 0), (1000, 1))}
+
+
+@case(Reason.STALLED, Reason.TOO_MANY_ITERATIONS)
+@pytest.mark.parametrize(
+    ("reason", "scene", "newton"),
+    [
+        (Reason.STALLED, body(**SLOW), DampedNewton(tolerance=1e-16)),  # below round-off
+        (Reason.TOO_MANY_ITERATIONS, body(**SLOW), DampedNewton(tolerance=1e-16, most_iterations=1)),
+    ],
+    ids=lambda value: getattr(value, "name", ""),
+)
+def test_a_newton_that_asks_too_much(reason, scene, newton):
+    stops(reason, lambda: scene.run(100.0, newton=newton))
+    scene.run(100.0)
+
+
+class Refusing(LinearSolver):
+    """Fails on right-hand sides that are `refused`: a solver of one's own that breaks down."""
+
+    def __init__(self, problem, refused):
+        super().__init__(problem.free)
+        self.refused = lambda right: refused(right[problem.ranges["u"]])
+
+    def solve(self, right, *vectors):
+        return not self.refused(right.FV().NumPy()) and super().solve(right, *vectors)
+
+
+@case(Reason.SINGULAR)
+def test_a_solver_that_breaks_down():
+    scene = body(**SLOW)
+    stops(Reason.SINGULAR, lambda: scene.run(100.0, solver=lambda problem: Refusing(problem, np.any)))
+    scene.run(100.0)
+
+
+@case(Reason.ESTIMATE_NOT_FINITE)
+def test_an_estimate_that_fails_does_not_stop_a_run():
+    """The defect of contents, with which errors are told, has no forces. Backward Euler's steps need no such solve."""
+    result = body(**SLOW).run(100.0, solver=lambda problem: Refusing(problem, lambda forces: not forces.any()))
+    reasons = {rejection.reason for step in result.steps for rejection in step.rejected}
+    assert Reason.ESTIMATE_NOT_FINITE in reasons
+    assert REMEDIES[Reason.ESTIMATE_NOT_FINITE] == REMEDIES[Reason.SINGULAR]
+
+
+def test_a_law_that_ends():
+    ending = replace(TABLE_1, permeability=lambda K, J, nS0: K * sqrt((1.1 - J) / 0.1))
+    stops(Reason.SINGULAR, lambda: body(material=ending, **SLOW).run(2000.0))
+    smooth = replace(TABLE_1, permeability=lambda K, J, nS0: K * sqrt((11 - J) / 10))
+    body(material=smooth, **SLOW).run(2000.0)
+
+
+@case(Reason.UNDETERMINED)
+def test_a_body_that_nothing_holds(monkeypatch):
+    # Without the checks of the scene: what else may leave a system undetermined is found in its matrix.
+    monkeypatch.setattr("ngswell.setup.setup.check_determined", lambda *arguments: None)
+    error = stops(Reason.UNDETERMINED, lambda: body(supports=[Symmetry("left")], **SLOW).run(100.0, Fixed(10.0)))
+    assert "the body can translate in y" in str(error)
+    body(**SLOW).run(100.0, Fixed(10.0))
+
+
+@dataclass(frozen=True)
+class Jump(Schedule):
+    """Salt [mol/l] that jumps at 5 s; a `kink` there, if it names it."""
+
+    kinks: tuple[float, ...] = ()
+    bends = ()
+    values = (0.15, 0.05)
+    uniform = True
+
+    def at(self, time):
+        return self.values[time > 5.0]
+
+    def signal(self):
+        value = Parameter(0.15)
+        return Signal(value, lambda time: value.Set(self.at(time)))
+
+    def check_on(self, where):
+        pass
+
+
+@case(Reason.ERROR_ABOVE_TOLERANCE)
+def test_a_history_that_jumps_unsaid():
+    def diluted(salt, steps):
+        return confined_column(None, salt, 10, model=Concentration()).run(20.0, steps)
+
+    stops(Reason.ERROR_ABOVE_TOLERANCE, lambda: diluted(Jump(), Adaptive(1e-8)))
+    diluted(Jump((5.0,)), Adaptive(1e-8))
+    diluted(Jump(), Adaptive(1e-5))
+    diluted(Jump(), Fixed(1.0))
+
+
+@case(Reason.OSCILLATES)
+def test_a_lagged_bath_is_told_of_its_treatment():
+    def diluted(treatment):
+        return strip(treatment, Ramp((0, 0.15), (10, 0.125))).run(1e4, Adaptive(1e-2, scheme=BACKWARD_EULER))
+
+    stops(Reason.OSCILLATES, lambda: diluted(Lagged()))
+    diluted(Penalty(1.0))
