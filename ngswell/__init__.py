@@ -1,8 +1,8 @@
 """Swelling of charged hydrated porous media on NGSolve. Units mm, N, s, K, mol/l.
 
-Folders, each importing only from those above it: errors, calls, checks, files, schedules, histories · mesh · physics ·
-models · baths · setup · problem · solve · stepping · analysis · observers · run · scene. Beside them stand closed_forms and
-plotting.
+Folders, each importing only from those above it: errors, calls, checks, files, streams, schedules, histories · mesh ·
+physics · models · baths · setup · problem · solve · stepping · analysis · observers · run · scene. Beside them stand
+closed_forms and plotting.
 """
 
 from __future__ import annotations
@@ -64,10 +64,11 @@ from ngswell.solve.newton import DampedNewton
 from ngswell.solve.two_level import TwoLevelSolver
 from ngswell.stepping.schemes import BACKWARD_EULER, ESDIRK4
 from ngswell.stepping.steps import Adaptive, Fixed
+from ngswell.streams import CSV
 from ngswell.version import __version__ as __version__
 
 __all__ = [
-    "BACKWARD_EULER", "ESDIRK4", "TABLE_1", "TABLE_2", "VTK", "Adaptive", "Area", "Averaged", "Axisymmetric", "Bath",
+    "BACKWARD_EULER", "CSV", "ESDIRK4", "TABLE_1", "TABLE_2", "VTK", "Adaptive", "Area", "Averaged", "Axisymmetric", "Bath",
     "Blend", "Call", "Checkpoint", "Coarseness", "Concentration", "Confined", "DampedNewton", "Essential", "Fixed",
     "Frozen", "HolmesMow", "InnerLayer", "InputError", "InstabilityError", "InstabilityWarning", "Integral", "Lagged",
     "LeastSquares", "Ledger", "Load", "LocalDonnan", "MackieMeares", "Material", "Multiplier", "NeoHookean",

@@ -6,6 +6,7 @@ import pickle
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 from ngswell.analysis.one_step import Growth, growth_factor
@@ -29,6 +30,7 @@ from ngswell.setup.supports import Support
 from ngswell.solve.direct import LinearSolver, solver_of
 from ngswell.solve.newton import DampedNewton
 from ngswell.stepping.steps import Control
+from ngswell.streams import CSV
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -142,6 +144,7 @@ class Scene(Setup):
         solver: Callable[[Problem], LinearSolver] = solver_of,
         checkpoint: Checkpoint | None = None,
         unstable: str = "warn",
+        log: str | Path | CSV | None = None,
     ) -> Result:
         """Run to `until` [s] from the start, or from the snapshot `resume` of an earlier run of this scene.
 
@@ -158,11 +161,14 @@ class Scene(Setup):
         took, now and then before where one grows faster than the steps follow. `Stability` among the observers looks in its
         place, at every step.
 
+        With `log`, a path or a `CSV`, the accepted steps are written there as they are made, and `result.steps` reads them;
+        else they stay in the memory, a quarter to a kilobyte each.
+
         Raises InputError before any computing, OutputError when an observer cannot write, and StepError when no step
         succeeds; `end` of that error is the last accepted state. With a checkpoint, Ctrl-C and SIGTERM end the run after
         the present step.
         """
-        return run(self, until, steps, observers, newton, resume, solver, checkpoint, unstable)
+        return run(self, until, steps, observers, newton, resume, solver, checkpoint, unstable, log)
 
 
 def _unpickled(pieces: bytes) -> Scene:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from array import array
 from collections.abc import Sequence
 
 import numpy as np
@@ -38,7 +39,7 @@ class Observer:
     def __init__(self, when: float | Sequence[float] | None = None, *settings: object) -> None:
         self._when = When(type(self).__name__, when)
         self._settings = settings
-        self._recorded: list[float] = []
+        self._recorded = array("d")
 
     @property
     def when(self) -> float | tuple[float, ...] | None:
@@ -69,7 +70,7 @@ class Observer:
     def resume(self, problem: Problem, begin: float, until: float, state: Tree) -> None:
         """Called instead of `start` in a run that began at `begin` and goes on from the present fields."""
         self.prepare(problem, begin, until)
-        self._recorded = state["time"].tolist()
+        self._recorded = array("d", state["time"].tolist())
         self.restore(state)
 
     @property
@@ -83,6 +84,10 @@ class Observer:
 
     def restore(self, state: Tree) -> None:
         """Take back what `state` gave."""
+
+    def kept(self) -> Tree:
+        """What a checkpoint keeps: that, and the times of the records."""
+        return {**self.state(), "time": self.time}
 
     def observe(self, problem: Problem, step: Step) -> None:
         """Called after every accepted step."""

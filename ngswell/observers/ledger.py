@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
 from ngswell.files import Tree
-from ngswell.observers.base import Observer
 from ngswell.observers.effluxes import Effluxes
+from ngswell.observers.records import Recorder
 from ngswell.problem.problem import Problem
 from ngswell.setup.snapshot import Snapshot
 from ngswell.stepping.steps import Step
+from ngswell.streams import CSV
 
 
-class Ledger(Observer):
+class Ledger(Recorder):
     """Fluid volume and cations held, and what left through each bath by the discrete fluxes.
 
     What left is what the balances of the nodes on a bath lack: their flows from the body, over the stages of the step, less
@@ -22,24 +27,24 @@ class Ledger(Observer):
 
     Attributes, one entry a time: `time` [s], `fluid` [mm², in 1-d mm, in 3-d mm³] and, where the model has
     ions, `cations` [mol/l times that];
-    `fluid_left`, `cations_left` by boundary, cumulative.
+    `fluid_left`, `cations_left` by boundary, cumulative. With `to`, a path or a `CSV`, records go to that file.
     """
 
-    def __init__(self) -> None:
-        super().__init__()
-        self._held: dict[str, list[float]] = {}
-        self._left: dict[tuple[str, str], list[float]] = {}
+    def __init__(self, to: str | Path | CSV | None = None) -> None:
+        super().__init__(to=to)
+        self._left: dict[tuple[str, str], float] = {}  # so far
+        self._balances: tuple[str, ...] = ()
 
     def prepare(self, problem: Problem, begin: float, until: float) -> None:
         self._vertices = {name: slice(r.start, r.start + problem.mesh.nv) for name, r in problem.ranges.items()}
-        self._effluxes = Effluxes(problem)
-        self._left = {key: [0.0] for key in self._effluxes.nodes}
+        self._effluxes, self._balances = Effluxes(problem), tuple(problem.model.balanced)
+        self._left = dict.fromkeys(self._effluxes.nodes, 0.0)
         self._contents = self._effluxes.sums(self._effluxes.contents())
 
-    def record(self, problem: Problem, time: float) -> None:
+    def row(self, problem: Problem) -> Mapping[str, Any]:
         held = self._effluxes.contents()
-        for name, unknown in problem.model.balanced.items():
-            self._held.setdefault(name, []).append(held[self._vertices[unknown]].sum())
+        whole = {name: held[self._vertices[unknown]].sum() for name, unknown in problem.model.balanced.items()}
+        return whole | {_left_through(boundary, name): amount for (name, boundary), amount in self._left.items()}
 
     def observe(self, problem: Problem, step: Step) -> None:
         effluxes = self._effluxes
@@ -53,26 +58,22 @@ class Ledger(Observer):
                 gone[key] -= weight * flow
         problem.restore(end)
         for key, amount in gone.items():
-            self._left[key].append(self._left[key][-1] + amount)
+            self._left[key] += amount
         super().observe(problem, step)
 
     def state(self) -> Tree:
-        left: Tree = {}
-        for (name, boundary), values in self._left.items():
-            left.setdefault(name, {})[boundary] = np.array(values)
-        return {"held": {name: np.array(values) for name, values in self._held.items()}, "left": left}
+        return {**super().state(), "left": np.array(list(self._left.values()))}
 
     def restore(self, state: Tree) -> None:
-        self._held = {name: list(values) for name, values in state["held"].items()}
-        self._left = {(name, boundary): list(state["left"][name][boundary]) for name, boundary in self._effluxes.nodes}
+        self._left = dict(zip(self._effluxes.nodes, state["left"].tolist(), strict=True))
 
     @property
     def fluid(self) -> NDArray:
-        return np.array(self._held["fluid"])
+        return self._table.columns()["fluid"]
 
     @property
     def cations(self) -> NDArray:
-        return np.array(self._held["cations"])
+        return self._table.columns()["cations"]
 
     @property
     def fluid_left(self) -> dict[str, NDArray]:
@@ -83,17 +84,22 @@ class Ledger(Observer):
         return self._left_of("cations")
 
     def _left_of(self, name: str) -> dict[str, NDArray]:
-        return {boundary: np.array(values) for (kind, boundary), values in self._left.items() if kind == name}
+        columns = self._table.columns()
+        return {boundary: columns[_left_through(boundary, name)] for kind, boundary in self._left if kind == name}
 
     def imbalance(self) -> dict[str, float]:
         """Largest |held − held₀ + left| over the run, of "fluid" and "cations", relative to the largest held.
 
         Of a balance that holds nothing, relative to the largest that left; 0 where nothing did.
         """
-        result = {}
-        for name, values in self._held.items():
-            held = np.array(values)
+        result, columns = {}, self._table.columns()
+        for name in self._balances:
+            held = columns[name]
             gone = sum(self._left_of(name).values(), np.zeros_like(held))
             scale = np.abs(held).max() or np.abs(gone).max() or 1.0
             result[name] = float(np.abs(held - held[0] + gone).max() / scale)
         return result
+
+
+def _left_through(boundary: str, name: str) -> str:
+    return f"{name} left through {boundary}"

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,19 +12,19 @@ from numpy.typing import NDArray
 
 from ngswell import checks
 from ngswell.errors import InputError
-from ngswell.files import Tree
 from ngswell.mesh.points import vertices_of
-from ngswell.observers.base import Observer
 from ngswell.observers.effluxes import Effluxes
+from ngswell.observers.records import Recorder
 from ngswell.problem.forms import BONUS_ORDER
 from ngswell.problem.problem import Problem
 from ngswell.stepping.steps import Step
+from ngswell.streams import CSV
 
 ON_BOUNDARY = 1e-9
 """Share of a cell by which a point may miss the boundary."""
 
 
-class Outflow(Observer):
+class Outflow(Recorder):
     """Fluid and cations that leave through one bath in unit time, and at `points` [mm] on it per current area.
 
         outflow = Outflow("top", (0.5, 1.0))
@@ -38,16 +39,21 @@ class Outflow(Observer):
 
     One entry a time: `fluid` [mm²/s, in 1-d mm/s, in 3-d mm³/s], `fluid_at` (rows of time, columns of points) [mm/s] and,
     where the model has them, `cations`, `cations_at` [mol/l times that]. Not a number at the start, before anything flowed.
-    Raises InputError for a boundary that is no bath's and for points off it.
+    With `to`, a path or a `CSV`, records go to that file. Raises InputError for a boundary that is no bath's and for points
+    off it.
     """
 
-    def __init__(self, boundary: str, *points: Sequence[float], when: float | Sequence[float] | None = None) -> None:
+    def __init__(
+        self,
+        boundary: str,
+        *points: Sequence[float],
+        when: float | Sequence[float] | None = None,
+        to: str | Path | CSV | None = None,
+    ) -> None:
         checks.name("Outflow: boundary", boundary, "top")
         self.boundary = boundary
         self.points = tuple(checks.vector("Outflow: a point", point, 1e6, "mm") for point in points)
-        super().__init__(when, boundary, *self.points)
-        self._whole: dict[str, list[float]] = {}
-        self._local: dict[str, list[list[float]]] = {}
+        super().__init__(when, boundary, *self.points, to=to)
 
     def prepare(self, problem: Problem, begin: float, until: float) -> None:
         self._effluxes = Effluxes(problem)
@@ -66,36 +72,27 @@ class Outflow(Observer):
         self._contents = contents
         super().observe(problem, step)
 
-    def record(self, problem: Problem, time: float) -> None:
+    def row(self, problem: Problem) -> Mapping[str, Any]:
         lacks = self._rate - self._effluxes.flows()
         sums = self._effluxes.sums(lacks)
-        for name, trace in self._traces.items():
-            self._whole.setdefault(name, []).append(sums[name, self.boundary])
-            self._local.setdefault(name, []).append(trace.flux(lacks))
-
-    def state(self) -> Tree:
-        local = {name: np.array(rows) for name, rows in self._local.items()}
-        return {"whole": {name: np.array(values) for name, values in self._whole.items()}, "local": local}
-
-    def restore(self, state: Tree) -> None:
-        self._whole = {name: list(values) for name, values in state["whole"].items()}
-        self._local = {name: [list(row) for row in rows] for name, rows in state["local"].items()}
+        whole = {name: sums[name, self.boundary] for name in self._traces}
+        return whole | {f"{name} at": trace.flux(lacks) for name, trace in self._traces.items()}
 
     @property
     def fluid(self) -> NDArray:
-        return np.array(self._whole["fluid"])
+        return self._table.columns()["fluid"]
 
     @property
     def cations(self) -> NDArray:
-        return np.array(self._whole["cations"])
+        return self._table.columns()["cations"]
 
     @property
     def fluid_at(self) -> NDArray:
-        return np.array(self._local["fluid"])
+        return self._table.columns()["fluid at"]
 
     @property
     def cations_at(self) -> NDArray:
-        return np.array(self._local["cations"])
+        return self._table.columns()["cations at"]
 
 
 class _Trace:

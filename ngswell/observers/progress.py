@@ -8,11 +8,11 @@ from time import perf_counter
 import numpy as np
 from tqdm import tqdm
 
-from ngswell.errors import Reason, Rejection
 from ngswell.files import Tree
 from ngswell.observers.base import Observer
 from ngswell.problem.problem import Problem
-from ngswell.stepping.steps import Step, why
+from ngswell.stepping.steps import Step
+from ngswell.stepping.tally import Tally
 
 
 class Progress(Observer):
@@ -24,8 +24,7 @@ class Progress(Observer):
 
     def prepare(self, problem: Problem, begin: float, until: float) -> None:
         self._begin, self._clock = begin, perf_counter()
-        self._reports = self._iterations = 0
-        self._rejected: list[Rejection] = []
+        self._tally = Tally()
         self._reached = begin
         self._bar = tqdm(
             total=until - begin,
@@ -36,40 +35,28 @@ class Progress(Observer):
         )
 
     def observe(self, problem: Problem, step: Step) -> None:
-        self._reports += 1
-        self._iterations += step.iterations
-        self._rejected += step.rejected
+        self._tally.add(step)
         self._reached = step.time
         self._bar.set_postfix_str(f"step {step.dt:.3g} s, {step.iterations} iterations", refresh=False)
         self._bar.update(step.time - self._begin - self._bar.n)
 
     def state(self) -> Tree:
-        counts = [self._reports, self._iterations, self._reached, perf_counter() - self._clock]
-        return {
-            "counts": np.array(counts),
-            "rejected": {
-                "numbers": np.array([(r.dt, r.error) for r in self._rejected]).reshape(-1, 2),
-                "reasons": np.array([r.reason.name for r in self._rejected], dtype=str),
-                "whats": np.array([r.what for r in self._rejected], dtype=str),
-            },
-        }
+        seconds = np.array(perf_counter() - self._clock)
+        return {"tally": self._tally.state(), "reached": np.array(self._reached), "seconds": seconds}
 
     def restore(self, state: Tree) -> None:
-        *counts, self._reached, seconds = state["counts"].tolist()
-        self._reports, self._iterations = map(int, counts)
-        rejected = state["rejected"]
-        entries = zip(rejected["numbers"].tolist(), rejected["reasons"].tolist(), rejected["whats"].tolist(), strict=True)
-        self._rejected = [Rejection(dt, Reason[name], what, error) for (dt, error), name, what in entries]
-        self._clock -= seconds
+        self._tally.restore(state["tally"])
+        self._reached = float(state["reached"])
+        self._clock -= float(state["seconds"])
         self._bar.update(self._reached - self._begin)
 
     def finish(self, problem: Problem) -> None:
         self._bar.close()
-        rejected, reasons = len(self._rejected), why(self._rejected)
+        tally = self._tally
         print(
-            f"{self.label}: t = {self._begin:g} to {self._reached:g} s, {self._reports} steps ({rejected} rejected), "
-            f"{self._iterations} Newton iterations, {problem.space.ndof} unknowns, {perf_counter() - self._clock:.1f} s"
-            + (f"; rejected: {reasons}" if reasons else ""),
+            f"{self.label}: t = {self._begin:g} to {self._reached:g} s, {tally.steps} steps ({tally.rejected} rejected), "
+            f"{tally.iterations} Newton iterations, {problem.space.ndof} unknowns, {perf_counter() - self._clock:.1f} s"
+            + (f"; rejected: {tally.why}" if tally.why else ""),
             file=sys.stderr,
             flush=True,
         )

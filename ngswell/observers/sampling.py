@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from ngsolve import CF, BoundaryFromVolumeCF, Integrate, Norm
@@ -14,50 +16,52 @@ from ngswell.files import Tree
 from ngswell.mesh.points import integral_on_boundary
 from ngswell.models.solid_state import FLUXES
 from ngswell.observers.base import Observer
+from ngswell.observers.records import Recorder
 from ngswell.problem.problem import Problem
 from ngswell.setup.snapshot import Snapshot
+from ngswell.streams import CSV
 
 
-class Probe(Observer):
+class Probe(Recorder):
     """Quantities at a point of the reference configuration [mm].
 
     `Probe((1.1, 0.5), "J", "p")`; then `probe.time` and `probe.values["J"]` are arrays, one row a record. Quantities and
-    units are those of `ngswell.models.solid_state.OUTPUT_UNITS`.
+    units are those of `ngswell.models.solid_state.OUTPUT_UNITS`. With `to`, a path or a `CSV`, records go to that file.
     """
 
-    def __init__(self, point: Sequence[float], *quantities: str, when: float | Sequence[float] | None = None) -> None:
+    def __init__(
+        self,
+        point: Sequence[float],
+        *quantities: str,
+        when: float | Sequence[float] | None = None,
+        to: str | Path | CSV | None = None,
+    ) -> None:
         if not quantities:
             raise InputError("Probe: name at least one quantity, such as 'displacement'")
         for quantity in quantities:
             checks.name("Probe: a quantity", quantity, "displacement")
         self.point, self.quantities = checks.vector("Probe: point", point, 1e6, "mm"), quantities
-        super().__init__(when, self.point, *quantities)
-        self._values: dict[str, list] = {name: [] for name in quantities}
+        super().__init__(when, self.point, *quantities, to=to)
 
     def prepare(self, problem: Problem, begin: float, until: float) -> None:
         if len(self.point) != problem.mesh.dim or not problem.mesh.Contains(*self.point):
             raise InputError(f"Probe: {self.point} is not a point of the {problem.mesh.dim}-d body")
         self._fields = {name: problem.state.output(name) for name in self.quantities}
 
-    def record(self, problem: Problem, time: float) -> None:
+    def row(self, problem: Problem) -> Mapping[str, Any]:
         point = problem.mesh(*self.point)
-        for name, field in self._fields.items():
-            self._values[name].append(field(point))
+        return {name: field(point) for name, field in self._fields.items()}
 
     @property
     def values(self) -> dict[str, NDArray]:
         """Records of each quantity: one row a time."""
-        return {name: np.array(rows) for name, rows in self._values.items()}
-
-    def state(self) -> Tree:
-        return self.values
-
-    def restore(self, state: Tree) -> None:
-        self._values = {name: list(state[name]) for name in self.quantities}
+        return self._table.columns()
 
 
-class Integral(Observer):
+class Integral(Recorder):
     """Integral of a quantity over the deformed body, or over the deformed `boundary`; of 1 if no quantity is named.
+
+    With `to`, a path or a `CSV`, records go to that file.
 
     Raises InputError for a flux on a boundary: `Outflow` has it from the balances. "stress" is made of derivatives too: its
     integral over a held side or a corner is off at any mesh where the stress is singular, and is no reaction.
@@ -68,8 +72,9 @@ class Integral(Observer):
         quantity: str | None = None,
         boundary: str | None = None,
         when: float | Sequence[float] | None = None,
+        to: str | Path | CSV | None = None,
     ) -> None:
-        super().__init__(when, quantity, boundary)
+        super().__init__(when, quantity, boundary, to=to)
         for what, value, example in (("quantity", quantity, "p"), ("boundary", boundary, "top")):
             if value is not None:
                 checks.name(f"Integral: {what}", value, example)
@@ -79,7 +84,6 @@ class Integral(Observer):
                 "what passes a bath is in Outflow('top') at each time and in Ledger() in all, and elsewhere nothing passes"
             )
         self.quantity, self.boundary = quantity, boundary
-        self._values: list = []
 
     def prepare(self, problem: Problem, begin: float, until: float) -> None:
         quantity = CF(1.0) if self.quantity is None else problem.state.output(self.quantity)
@@ -91,30 +95,23 @@ class Integral(Observer):
             cofactor = BoundaryFromVolumeCF(problem.state.cofactor)
             self._quantity, self._measure = quantity, Norm(cofactor * problem.kinematics.normal) * weight
 
-    def record(self, problem: Problem, time: float) -> None:
+    def row(self, problem: Problem) -> Mapping[str, Any]:
         mesh, order = problem.mesh, 2 * problem.model.order + 2
         if self.boundary is None:
-            self._values.append(Integrate(self._density, mesh, order=order))
-        else:
-            self._values.append(integral_on_boundary(mesh, self._quantity, self.boundary, order, self._measure))
+            return {"value": Integrate(self._density, mesh, order=order)}
+        return {"value": integral_on_boundary(mesh, self._quantity, self.boundary, order, self._measure)}
 
     @property
     def values(self) -> NDArray:
         """Records, one row a time; the quantity's unit times mm (1-d, or a boundary in 2-d), mm² or mm³."""
-        return np.array(self._values)
-
-    def state(self) -> Tree:
-        return {"values": self.values}
-
-    def restore(self, state: Tree) -> None:
-        self._values = list(state["values"])
+        return self._table.columns().get("value", np.zeros(0))
 
 
 class Area(Integral):
     """Area of the deformed body in plane strain [mm²], its volume in three dimensions [mm³], its length confined [mm]."""
 
-    def __init__(self, when: float | Sequence[float] | None = None) -> None:
-        super().__init__(when=when)
+    def __init__(self, when: float | Sequence[float] | None = None, to: str | Path | CSV | None = None) -> None:
+        super().__init__(when=when, to=to)
 
 
 class Snapshots(Observer):

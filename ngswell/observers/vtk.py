@@ -66,7 +66,7 @@ class VTK(Observer):
     def start(self, problem: Problem, begin: float, until: float) -> None:
         with self._let_go_on_errors():
             self.prepare(problem, begin, until)
-            self._recorded = []
+            del self._recorded[:]
             piece = re.compile(rf"{re.escape(self.path.name)}({PIECE})?\.vtu")
             pieces = [file for file in self.path.parent.iterdir() if piece.fullmatch(file.name)]
             old = [file for file in [self._series, *pieces] if file.exists()]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Sequence
 from math import isclose
 
@@ -43,12 +44,15 @@ class When:
             for time in self.value:
                 if not begin <= time <= until:
                     raise InputError(f"{self.what}: {time:g} s is outside the run, {begin:g} to {until:g} s")
-            self._times = list(self.value)
+            self._times = sorted(self.value)
         return self._times
 
     def due(self, time: float) -> bool:
         """Whether `time` [s] is one of them; every time is where none are named."""
-        return self.value is None or any(isclose(time, t, rel_tol=1e-12, abs_tol=1e-12) for t in self._times)
+        if self.value is None:
+            return True
+        after = bisect_left(self._times, time)
+        return any(isclose(time, t, rel_tol=1e-12, abs_tol=1e-12) for t in self._times[max(0, after - 1) : after + 1])
 
     def __repr__(self) -> str:
         return "" if self.value is None else f"when={np.array(self.value).tolist()}"

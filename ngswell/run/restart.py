@@ -10,10 +10,11 @@ from typing import Any
 import ngsolve
 
 from ngswell import checks
-from ngswell.errors import InputError, Reason, Rejection
+from ngswell.errors import InputError
 from ngswell.files import Tree, read_tree, write_tree
 from ngswell.observers.base import Observer
 from ngswell.run.digest import setup_digest
+from ngswell.run.log import as_list, from_list
 from ngswell.setup.setup import Setup
 from ngswell.setup.snapshot import Snapshot
 from ngswell.stepping.steps import StepReport
@@ -27,14 +28,15 @@ FORMAT = 3
 class Restart:
     """A run after one of its steps, for `scene.run(..., resume=...)`.
 
-    `snapshot` is the state; `begin` [s] where the run began; `steps` and `seconds` its work so far; `stepper` and
-    `observers` (by name and settings) what these remember. `method` and `digest` say which steps and which setup it belongs
-    to, `versions` what computed it, `file` where it was read.
+    `snapshot` is the state; `begin` [s] where the run began; `steps` and `seconds` its work so far, `log` where its steps
+    stand in a file; `stepper` and `observers` (by name and settings) what these remember. `method` and `digest` say which
+    steps and which setup it belongs to, `versions` what computed it, `file` where it was read.
     """
 
     snapshot: Snapshot
     begin: float
     steps: tuple[StepReport, ...]
+    log: Tree
     seconds: float
     stepper: Tree
     observers: tuple[tuple[str, Tree], ...]
@@ -66,24 +68,11 @@ class Restart:
             "format": FORMAT, "versions": self.versions, "begin": self.begin, "time": self.snapshot.time,
             "meaning": dict(self.snapshot.meaning or {}), "seconds": self.seconds, "method": self.method,
             "digest": self.digest, "observers": [name for name, _ in self.observers],
-            "steps": [_as_list(step) for step in self.steps],
+            "steps": [as_list(step) for step in self.steps],
         }  # fmt: skip
         observers = {str(number): state for number, (_, state) in enumerate(self.observers)}
-        write_tree(
-            path, "Checkpoint", header, {"fields": self.snapshot.values, "stepper": self.stepper, "observers": observers}
-        )
-
-
-def _as_list(step: StepReport) -> list[Any]:
-    rejected = [[r.dt, r.reason.name, r.what, r.error] for r in step.rejected]
-    return [step.time, step.dt, step.iterations, rejected, step.error]
-
-
-def _step(entry: list[Any]) -> StepReport:
-    time, dt, iterations, rejected, error = entry
-    return StepReport(
-        time, dt, iterations, tuple(Rejection(size, Reason[name], what, e) for size, name, what, e in rejected), error
-    )
+        tree = {"fields": self.snapshot.values, "stepper": self.stepper, "observers": observers, "log": self.log}
+        write_tree(path, "Checkpoint", header, tree)
 
 
 def read_checkpoint(path: str | Path) -> Restart:
@@ -109,7 +98,8 @@ def _restart(header: dict[str, Any], tree: Tree, path: Path) -> Restart:
     return Restart(
         Snapshot(header["time"], tree["fields"], header["meaning"]),
         header["begin"],
-        tuple(_step(entry) for entry in header["steps"]),
+        tuple(from_list(entry) for entry in header["steps"]),
+        tree["log"],
         header["seconds"],
         tree["stepper"],
         tuple((name, observers[str(number)]) for number, name in enumerate(header["observers"])),

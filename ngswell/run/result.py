@@ -7,17 +7,21 @@ from functools import cached_property
 from typing import Any
 
 from ngswell.problem.discretisation import Discretisation
+from ngswell.run.log import StepLog
 from ngswell.setup.setup import Setup
 from ngswell.setup.snapshot import Snapshot
-from ngswell.stepping.steps import StepReport, why
+from ngswell.stepping.steps import StepReport
 
 
 @dataclass(frozen=True)
 class Result:
-    """What a run did: its accepted steps, and the state it ended in. Numbers of interest are kept by the observers."""
+    """What a run did: its accepted steps, and the state it ended in. Numbers of interest are kept by the observers.
+
+    `steps` are read from the file of the run that was given one, `log=`.
+    """
 
     setup: Setup = field(repr=False)
-    steps: tuple[StepReport, ...]
+    log: StepLog = field(repr=False)
     end: Snapshot
     seconds: float
     factorisations: int
@@ -37,17 +41,23 @@ class Result:
         return Discretisation(self.setup).state_at(self.end)
 
     @property
+    def steps(self) -> tuple[StepReport, ...]:
+        """The accepted steps."""
+        return self.log.steps
+
+    @property
     def iterations(self) -> int:
         """Newton iterations of all accepted steps."""
-        return sum(step.iterations for step in self.steps)
+        return self.log.tally.iterations
 
     @property
     def rejections(self) -> int:
         """Rejected steps."""
-        return sum(len(step.rejected) for step in self.steps)
+        return self.log.tally.rejected
 
     def summary(self) -> str:
         """What the run took, and why steps were rejected."""
-        done = f"{len(self.steps)} steps, {self.iterations} Newton iterations, {self.seconds:.1f} s"
-        reasons = why(rejection for step in self.steps for rejection in step.rejected)
+        tally = self.log.tally
+        done = f"{tally.steps} steps, {tally.iterations} Newton iterations, {self.seconds:.1f} s"
+        reasons = tally.why
         return f"t = {self.end.time:.10g} s after {done}" + (f"; rejected: {reasons}" if reasons else "")

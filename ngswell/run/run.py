@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from contextlib import nullcontext
+from contextlib import closing, nullcontext
+from pathlib import Path
 from time import perf_counter
 from typing import Any
 
@@ -19,6 +20,7 @@ from ngswell.problem.problem import Problem
 from ngswell.run.checkpoint import Checkpoint
 from ngswell.run.digest import setup_digest
 from ngswell.run.guard import Guard
+from ngswell.run.log import StepLog
 from ngswell.run.method import Method
 from ngswell.run.restart import Restart, versions
 from ngswell.run.result import Result
@@ -30,7 +32,8 @@ from ngswell.setup.snapshot import Snapshot
 from ngswell.solve.direct import LinearSolver, solver_of
 from ngswell.solve.newton import DampedNewton
 from ngswell.stepping.stepper import Failed, Stepper
-from ngswell.stepping.steps import Control, StepReport
+from ngswell.stepping.steps import Control
+from ngswell.streams import CSV
 
 
 def run(
@@ -43,6 +46,7 @@ def run(
     solver: Callable[[Problem], LinearSolver] = solver_of,
     checkpoint: Checkpoint | None = None,
     unstable: str = "warn",
+    log: str | Path | CSV | None = None,
 ) -> Result:
     """The run that `Scene.run` describes."""
     method = Method.checked(setup, steps, newton, solver, unstable)
@@ -50,8 +54,9 @@ def run(
     setup.check_unchanged()
     if checkpoint is not None:
         checks.instance("checkpoint", checkpoint, Checkpoint, "a Checkpoint(path)")
-    with nullcontext() if checkpoint is None else checkpoint.alone():
-        return _run(setup, until, method, watch, resume, checkpoint)
+    steps_taken = StepLog(log)
+    with nullcontext() if checkpoint is None else checkpoint.alone(), closing(steps_taken):
+        return _run(setup, until, method, watch, resume, checkpoint, steps_taken)
 
 
 def _run(
@@ -61,6 +66,7 @@ def _run(
     watch: Watch,
     resume: Snapshot | Restart | None,
     checkpoint: Checkpoint | None,
+    steps: StepLog,
 ) -> Result:
     start = Start.checked(setup, until, resume, checkpoint, watch)
     method.check_first_step(start.begin, start.until)
@@ -68,14 +74,15 @@ def _run(
     start.apply(problem)
     with TaskManager(), threadpool_limits(1, user_api="blas"), Signals(checkpoint is not None) as signals, watch:
         watch.start(problem, start.begin, start.time, start.until, start.remembered)
+        steps.begin(*start.logged)
         stepper = method.stepper(problem, timetable, start.restart)
         guard = Guard(method.unstable, watch, problem, stepper.factorisation.solver, timetable.duration)
-        log = _Log(start, method, stepper, watch, setup_digest(setup) if checkpoint else {})
+        log = _Log(start, method, stepper, watch, setup_digest(setup) if checkpoint else {}, steps)
         if checkpoint:
             checkpoint.save(log.restart)
         try:
             for step in signals.until_received(stepper):
-                log.reports.append(step.report())
+                steps.append(step.report())
                 watch.observe(step)
                 guard.after_step(step, stepper.accepted)
                 if checkpoint:
@@ -111,23 +118,25 @@ def _step_error(failed: Failed, problem: Problem, stepper: Stepper, start: float
 class _Log:
     """The work of a run so far: what checkpoints write and the result tells."""
 
-    def __init__(self, start: Start, method: Method, stepper: Stepper, watch: Watch, digest: dict[str, str]) -> None:
+    def __init__(
+        self, start: Start, method: Method, stepper: Stepper, watch: Watch, digest: dict[str, str], steps: StepLog
+    ) -> None:
         earlier = start.restart
         self._start, self._stepper, self._watch, self._digest = start, stepper, watch, digest
         self._method = method.text(stepper.factorisation.solver)
         self._clock = perf_counter() - (0.0 if earlier is None else earlier.seconds)
-        self.reports: list[StepReport] = [] if earlier is None else list(earlier.steps)
+        self._steps = steps
 
     def restart(self) -> Restart:
         """The run after its last accepted step."""
         stepper, seconds = self._stepper, perf_counter() - self._clock
         return Restart(
-            snapshot=stepper.accepted, begin=self._start.begin, steps=tuple(self.reports), seconds=seconds,
-            stepper=stepper.state(), observers=self._watch.state(), method=self._method, digest=self._digest,
-            versions=versions(),
+            snapshot=stepper.accepted, begin=self._start.begin, steps=self._steps.kept, log=self._steps.state(),
+            seconds=seconds, stepper=stepper.state(), observers=self._watch.state(), method=self._method,
+            digest=self._digest, versions=versions(),
         )  # fmt: skip
 
     def result(self, setup: Setup) -> Result:
         stepper, solver = self._stepper, self._stepper.factorisation.solver
         seconds = perf_counter() - self._clock
-        return Result(setup, tuple(self.reports), stepper.accepted, seconds, solver.factorisations, solver.solves)
+        return Result(setup, self._steps, stepper.accepted, seconds, solver.factorisations, solver.solves)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from ngswell import checks
 from ngswell.errors import InputError
+from ngswell.files import Tree
 from ngswell.problem.problem import Problem
 from ngswell.run.checkpoint import Checkpoint
 from ngswell.run.restart import Restart
@@ -13,6 +14,7 @@ from ngswell.run.watch import Watch
 from ngswell.schedules import LARGEST
 from ngswell.setup.setup import Setup
 from ngswell.setup.snapshot import Snapshot
+from ngswell.stepping.steps import StepReport
 from ngswell.stepping.timetable import Timetable, same_time
 
 
@@ -66,6 +68,11 @@ class Start:
     @property
     def remembered(self) -> tuple:
         return () if self.restart is None else self.restart.observers
+
+    @property
+    def logged(self) -> tuple[tuple[StepReport, ...], Tree]:
+        """The steps of the earlier part, and where those in a file stand."""
+        return ((), {}) if self.restart is None else (self.restart.steps, self.restart.log)
 
     def apply(self, problem: Problem) -> None:
         """Put the fields where the run starts."""

@@ -62,7 +62,7 @@ class Watch:
 
     def state(self) -> tuple[tuple[str, Tree], ...]:
         """What observers that take part in checkpoints remember, by their settings."""
-        return tuple((repr(o), {**o.state(), "time": o.time}) for o in self.observers if o.remembers)
+        return tuple((repr(o), o.kept()) for o in self.observers if o.remembers)
 
     def __enter__(self) -> Watch:
         return self

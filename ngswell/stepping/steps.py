@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Iterable
 from dataclasses import dataclass
 from math import inf
 from typing import NamedTuple, Protocol, runtime_checkable
@@ -59,12 +57,6 @@ class Step(StepReport):
     def report(self) -> StepReport:
         """Without the states of the stages."""
         return StepReport(self.time, self.dt, self.iterations, self.rejected, self.error)
-
-
-def why(rejected: Iterable[Rejection]) -> str:
-    """The reasons of rejected steps, the most frequent first."""
-    counts = Counter(rejection.reason.text(rejection.what) for rejection in rejected)
-    return ", ".join(f"{count} × {reason}" for reason, count in counts.most_common())
 
 
 @runtime_checkable

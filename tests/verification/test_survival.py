@@ -41,8 +41,15 @@ class Say(Observer):
 scene = strip(None, c=Ramp((0, 0.15), (10, 0.125)), model=Potential(), cells=(1, 8))
 checkpoint = Checkpoint("run", every=float(sys.argv[1]))
 top, ledger, half = Probe((0.0, 0.5), "displacement", "p", "c_plus"), Ledger(), Area(when=7.5)
+files = {}
+if sys.argv[4] == "files":
+    top, ledger, half = (
+        Probe((0.0, 0.5), "displacement", "p", "c_plus", to=CSV("top.csv", overwrite=True)),
+        Ledger(to=CSV("ledger.csv", overwrite=True)), Area(when=7.5, to=CSV("area.csv", overwrite=True)),
+    )
+    files = {"log": CSV("steps.csv", overwrite=True)}
 watched = [top, ledger, half, Ballast(), VTK("series", "p", overwrite=True), Say()]
-result = scene.run(60.0, Adaptive(float(sys.argv[3])), watched, checkpoint=checkpoint)
+result = scene.run(60.0, Adaptive(float(sys.argv[3])), watched, checkpoint=checkpoint, **files)
 np.savez("final", end=result.end.values, steps=[step.dt for step in result.steps], half=half.values, fluid=ledger.fluid,
          left=ledger.fluid_left["top"], time=top.time, **top.values)
 """
@@ -55,9 +62,9 @@ def script(tmp_path_factory):
     return path
 
 
-def start(script, folder, every=0.0, ballast=0, tolerance=1e-4, **options):
+def start(script, folder, every=0.0, ballast=0, tolerance=1e-4, keep="memory", **options):
     return subprocess.Popen(
-        [sys.executable, str(script), str(every), str(ballast), str(tolerance)],
+        [sys.executable, str(script), str(every), str(ballast), str(tolerance), keep],
         cwd=folder, env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}, text=True,
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, **options,
     )  # fmt: skip
@@ -68,14 +75,16 @@ def results(folder):
     with np.load(folder / "final.npz") as archive:
         numbers = {name: archive[name].tobytes() for name in archive.files}
     names = {file.name for file in folder.iterdir()}
-    return numbers, names, {name: (folder / name).read_bytes() for name in names if name.startswith("series")}
+    written = {name: (folder / name).read_bytes() for name in names if name.startswith("series") or name.endswith(".csv")}
+    return numbers, names, written
 
 
-@pytest.mark.parametrize("ballast", [0, 2_000_000])
-def test_a_run_that_is_killed_again_and_again_ends_with_the_same_numbers(ballast, script, tmp_path):
+@pytest.mark.parametrize(("ballast", "keep"), [(0, "files"), (2_000_000, "memory")])
+def test_a_run_that_is_killed_again_and_again_ends_with_the_same_numbers(ballast, keep, script, tmp_path):
+    """All that writes: VTK series, checkpoints, and files of records and steps."""
     whole = tmp_path / "whole"
     whole.mkdir()
-    run = start(script, whole, ballast=ballast)
+    run = start(script, whole, ballast=ballast, keep=keep)
     run.stdout.readline()
     begun = time.perf_counter()
     assert run.wait() == 0, run.stderr.read()
@@ -88,7 +97,7 @@ def test_a_run_that_is_killed_again_and_again_ends_with_the_same_numbers(ballast
         folder = tmp_path / str(seed)
         folder.mkdir()
         while True:
-            run = start(script, folder, ballast=ballast)
+            run = start(script, folder, ballast=ballast, keep=keep)
             if random.random() < 0.9:  # else while it is loading
                 run.stdout.readline()
             try:
@@ -263,6 +272,33 @@ def test_a_limit_on_file_sizes(script, tmp_path):
         tmp_path, errors, "ngswell.errors.OutputError: Checkpoint: run could not be written (File too large)"
     )
     assert left.snapshot.time < 60.0
+
+
+FULL = """
+import resource
+from ngswell import CSV, OutputError
+from ngswell.streams import Stream
+
+stream = Stream(CSV("J.csv"), "Probe")
+stream.begin()
+resource.setrlimit(resource.RLIMIT_FSIZE, (100, 100))
+try:
+    while True:
+        stream.write([0.1, "0.123456789"])
+except OutputError as error:
+    print(error)
+print(stream.state()["written"][0])
+"""
+
+
+def test_a_record_that_finds_no_room_is_not_begun(tmp_path):
+    said = subprocess.run(
+        [sys.executable, "-c", FULL], cwd=tmp_path, text=True, capture_output=True, check=True,
+        env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])},
+    ).stdout  # fmt: skip
+    assert said.startswith("Probe: J.csv could not be written (it is cut short; is the disk full?)")
+    assert said.endswith("\n96\n")
+    assert (tmp_path / "J.csv").read_text() == 6 * "0.1,0.123456789\n"
 
 
 def test_a_read_only_disk(script, small_disk):

@@ -88,7 +88,7 @@ def series(observers):
     """All that was recorded, as one tree of arrays; what the clock says left out."""
     found = {}
     for number, observer in enumerate(observers):
-        found[str(number)] = {key: value for key, value in observer.state().items() if key != "counts"}
+        found[str(number)] = {key: value for key, value in observer.state().items() if key != "seconds"}
         found[f"{number} time"] = observer.time
     return found
 

@@ -1,0 +1,133 @@
+"""Records of numbers, in the memory or in a file."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from array import array
+from collections.abc import Mapping, Sequence
+from math import prod
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ngswell.files import Tree
+from ngswell.observers.base import Observer
+from ngswell.problem.problem import Problem
+from ngswell.streams import CSV, Stream
+
+
+class Table:
+    """Rows of a time and of numbers, vectors and tensors by name; all rows are alike."""
+
+    def __init__(self, what: str, to: CSV | None) -> None:
+        self._stream = None if to is None else Stream(to, what)
+        self._numbers = array("d")  # of all rows, one after another; none of those in a file
+        self._shapes: dict[str, tuple[int, ...]] = {}
+
+    def begin(self) -> None:
+        if self._stream is not None:
+            self._stream.begin()
+
+    def append(self, time: float, row: Mapping[str, Any]) -> None:
+        values = {name: np.asarray(value, dtype=float) for name, value in row.items()}
+        numbers = [float(time), *(number for value in values.values() for number in value.ravel().tolist())]
+        if not self._shapes:
+            self._shapes = {name: value.shape for name, value in values.items()}
+            if self._stream is not None:
+                self._stream.write(["time", *self._header()])
+        if self._stream is not None:
+            self._stream.write(list(map(repr, numbers)))
+        else:
+            self._numbers.extend(numbers)
+
+    def _header(self) -> list[str]:
+        """Names of the columns beside the time: "p", "displacement 1"."""
+        header = []
+        for name, shape in self._shapes.items():
+            header += [name] if shape == () else [f"{name} {number}" for number in range(1, prod(shape) + 1)]
+        return header
+
+    def _rows(self) -> NDArray:
+        width = 1 + sum(map(prod, self._shapes.values()))
+        if self._stream is None:
+            return np.array(self._numbers).reshape(-1, width)
+        return np.column_stack(list(self._stream.to.read().values())) if self._shapes else np.zeros((0, width))
+
+    @property
+    def time(self) -> NDArray:
+        """Times of the records [s]."""
+        return self._rows()[:, 0].copy()
+
+    def columns(self) -> dict[str, NDArray]:
+        """Records of each quantity: one row a time."""
+        rows, at, found = self._rows(), 1, {}
+        for name, shape in self._shapes.items():
+            found[name] = rows[:, at : at + prod(shape)].reshape(len(rows), *shape).copy()
+            at += prod(shape)
+        return found
+
+    def state(self) -> Tree:
+        """The records, or where they stand in the file."""
+        shapes = {name: np.array(shape, dtype=int) for name, shape in self._shapes.items()}
+        return {"shapes": shapes} | ({"rows": self._rows()} if self._stream is None else self._stream.state())
+
+    def resume(self, state: Tree) -> None:
+        self._shapes = {name: tuple(shape.tolist()) for name, shape in state["shapes"].items()}
+        if self._stream is None:
+            self._numbers = array("d", state["rows"].ravel().tolist())
+        else:
+            self._stream.resume(state)
+
+    def close(self) -> None:
+        if self._stream is not None:
+            self._stream.close()
+
+
+class Recorder(Observer):
+    """An observer whose records are rows of numbers: in the memory, or in the file `to` (a `CSV`, or its path), from which
+    they are read when asked for. A class gives `row` in place of `record`, `state` and `restore`."""
+
+    def __init__(
+        self, when: float | Sequence[float] | None = None, *settings: object, to: str | Path | CSV | None = None
+    ) -> None:
+        file = CSV.of(f"{type(self).__name__}: to", to)
+        super().__init__(when, *settings, *(() if file is None else (file,)))
+        self._table = Table(type(self).__name__, file)
+
+    @abstractmethod
+    def row(self, problem: Problem) -> Mapping[str, Any]:
+        """The record of the present fields: numbers, vectors or tensors by name."""
+
+    @property
+    def time(self) -> NDArray:
+        """Times of the records [s]."""
+        return self._table.time
+
+    def start(self, problem: Problem, begin: float, until: float) -> None:
+        self.prepare(problem, begin, until)
+        self._table.begin()
+        try:
+            self._record_if_due(problem, begin)
+        except BaseException:
+            self._table.close()
+            raise
+
+    def resume(self, problem: Problem, begin: float, until: float, state: Tree) -> None:
+        self.prepare(problem, begin, until)
+        self._table.resume(state)
+        self.restore(state)
+
+    def _record_if_due(self, problem: Problem, time: float) -> None:
+        if self._when.due(time):
+            self._table.append(time, self.row(problem))
+
+    def state(self) -> Tree:
+        return self._table.state()
+
+    def kept(self) -> Tree:
+        return self.state()
+
+    def finish(self, problem: Problem) -> None:
+        self._table.close()
