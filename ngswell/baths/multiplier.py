@@ -5,13 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from ngswell.baths.treatment import Contact, Prescribed, Surroundings, Weak, per_cell
-from ngswell.checks import Field
+from ngswell.baths.treatment import Contact, Prescribed, Surroundings, Weak
 from ngswell.errors import InputError
 from ngswell.mesh.points import vertices_of
 from ngswell.models.model import Model
 from ngswell.models.term import Role, Term
-from ngswell.physics.material import Material
 
 CONDITION = "equilibrium with the bath"
 """What multipliers are tested with, beside the balances."""
@@ -23,17 +21,13 @@ class Multiplier(Weak):
 
         ∫ (p − p_D) δ da = 0,  ∫ (c − c_D) δ da = 0   for every trace δ,   effluxes K/h times the one, D₊/h times the other.
 
-    Measured in K/h and D₊/h the multipliers have the dimensions of p and c.
+    Measured in K/h and D₊/h, the largest of the body before any law, the multipliers have the dimensions of p and c.
     """
 
     multipliers: ClassVar[bool] = True
 
     def __str__(self) -> str:
         return "Lagrange multipliers"
-
-    def factors(self, material: Material, h: Field) -> tuple[Field, Field]:
-        """K/h [mm³/(N s)] and D₊/h [mm/s]."""
-        return per_cell(material, h)
 
     def suits(self, model: Model) -> bool:
         return model.charge_field is not None
@@ -51,13 +45,12 @@ class Multiplier(Weak):
                 )
 
     def terms(self, contact: Contact) -> list[Term]:
-        factors = dict(zip(contact.excess, self.factors(contact.state.material, contact.h), strict=True))
         terms = []
         for balance, value in contact.excess.items():
             unknown, test = contact.multipliers[balance]
-            condition = factors[balance] * value * test * contact.stretch
+            condition = contact.conductances[balance] * value * test * contact.stretch
             terms += [
-                contact.efflux(balance, factors[balance] * unknown),
+                contact.efflux(balance, contact.conductances[balance] * unknown),
                 Term(CONDITION, balance, condition, role=Role.CONDITION, boundary=contact.boundary),
             ]
         return terms

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ngswell import checks
-from ngswell.baths.treatment import Contact, Weak, per_cell
+from ngswell.baths.treatment import Contact, Weak
 from ngswell.checks import Field
 from ngswell.errors import InputError
 from ngswell.models.term import Term
-from ngswell.physics.material import Material
+from ngswell.physics import laws
 
 
 @dataclass(frozen=True)
@@ -19,7 +19,8 @@ class Penalty(Weak):
         fluid efflux q̄ = ε (p − p_D),   cation efflux j̄ = ε (c − c_D)    per current area.
 
     Give either the paper's raw ε (`Penalty(40.0)`: mm³/(N s) for p and mm/s for c, one number for both dimensions) or
-    `Penalty(relative=1e3)`: that multiple of K/h for p and of D₊/h for c, h being the size of the cells at the boundary.
+    `Penalty(relative=1e3)`: that multiple of K/h for p and of D₊/h for c, h being the size of the cells at the boundary. K
+    and D₊ are those of the material's laws in the state that is sought.
     """
 
     epsilon: float | None = None
@@ -36,11 +37,14 @@ class Penalty(Weak):
             return f"weak, ε = {self.epsilon:g}"
         return f"weak, ε = {self.relative:g} K/h and D₊/h"
 
-    def factors(self, material: Material, h: Field) -> tuple[Field, Field]:
-        """ε for p [mm³/(N s)] and for c [mm/s] on a boundary whose cells have the size h [mm]."""
+    def factors(self, contact: Contact) -> tuple[Field, Field]:
+        """ε for p [mm³/(N s)] and for c [mm/s]: numbers, or fields where K or D₊ are."""
         if self.relative is None:
             return self.epsilon, self.epsilon
-        return per_cell(material, h, self.relative)
+        state = contact.state
+        D_plus, _ = laws.diffusivities(state.nF, state.material)
+        return self.relative / contact.h * state.permeability, self.relative / contact.h * D_plus
 
     def terms(self, contact: Contact) -> list[Term]:
-        return contact.effluxes(*self.factors(contact.state.material, contact.h))
+        factors = self.factors(contact)
+        return contact.effluxes(*factors, in_cells=not all(map(checks.is_number, factors)))

@@ -119,7 +119,8 @@ class Contact:
 
     `excess` are the unknowns less their equilibrium with the bath, by the balance that gets the efflux: p − p_D and c − c_D
     in `Concentration`, P − P̄ and c̃ − c̄ in `Potential`. `tests` and `multipliers` (trial, test) belong to the same balances.
-    `h` is the mean size of the boundary's cells normal to it [mm].
+    `h` is the mean size of the boundary's cells normal to it [mm], `order` that of the displacement; `conductances` are
+    K/h [mm³/(N s)] and D₊/h [mm/s] with the largest values of these parameters: sizes, before any law.
     """
 
     boundary: str
@@ -128,20 +129,34 @@ class Contact:
     tests: dict[str, CoefficientFunction]
     multipliers: dict[str, tuple[CoefficientFunction, CoefficientFunction]]
     h: float
+    order: int
+    conductances: dict[str, float]
 
     @property
     def stretch(self) -> CoefficientFunction:
         """da/dA [-], from tangential derivatives."""
         return self.state.kinematics.area_stretch(self.state.u)
 
-    def efflux(self, balance: str, flux: CoefficientFunction) -> Term:
-        """The term of an efflux per current area: of fluid [mm/s], of cations [mol/l mm/s]."""
-        return Term(balance, "efflux", flux * self.tests[balance] * self.stretch, role=Role.EFFLUX, boundary=self.boundary)
+    def efflux(self, balance: str, flux: CoefficientFunction, in_cells: bool = False) -> Term:
+        """The term of an efflux per current area: of fluid [mm/s], of cations [mol/l mm/s].
 
-    def effluxes(self, fluid: Field, cations: Field) -> list[Term]:
-        """Effluxes that are so many times the excess: `fluid` [mm³/(N s)], `cations` [mm/s]."""
+        `in_cells` evaluates it in the cells beside the boundary, as a flux that depends on J or on a field given by the
+        domains of the mesh needs. That costs the elimination of what is inside cells.
+        """
+        if not in_cells:
+            power = flux * self.tests[balance] * self.stretch
+            return Term(balance, "efflux", power, role=Role.EFFLUX, boundary=self.boundary)
+        stretch = Norm(self.state.cofactor * self.state.kinematics.normal)
+        return self.in_cells(balance, "efflux", flux * self.tests[balance] * stretch, Role.EFFLUX)
+
+    def effluxes(self, fluid: Field, cations: Field, in_cells: bool = False) -> list[Term]:
+        """Effluxes that are so many times the excess: `fluid` [mm³/(N s)], `cations` [mm/s]; `in_cells` as in `efflux`."""
         factors = {"fluid": fluid, "cations": cations}
-        return [self.efflux(balance, factors[balance] * value) for balance, value in self.excess.items()]
+        return [self.efflux(balance, factors[balance] * value, in_cells) for balance, value in self.excess.items()]
+
+    def in_cells(self, balance: str, name: str, integrand: CoefficientFunction, role: Role) -> Term:
+        """A term per reference area of the boundary, evaluated in the cells beside it."""
+        return Term(balance, name, integrand, role=role, boundary=self.boundary, normal_derivatives=True)
 
 
 @dataclass(frozen=True)
@@ -155,11 +170,6 @@ class PrescribedBoundary:
     boundary: BathBoundary
     charge: GridFunction | None
     equilibrium: Callable[[Any], dict[str, CoefficientFunction]]
-
-
-def per_cell(material: Material, h: Field, multiple: float = 1.0) -> tuple[Field, Field]:
-    """That multiple of K/h [mm³/(N s)] and of D₊/h [mm/s], for cells of the size h [mm] normal to the boundary."""
-    return multiple * material.K / h, multiple * material.D_plus / h
 
 
 def normal_size(kinematics: Kinematics) -> CoefficientFunction:

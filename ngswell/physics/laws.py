@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from ngsolve import CoefficientFunction
+from ngsolve import CF, CoefficientFunction, Norm
 
 from ngswell.checks import Field
 from ngswell.physics import donnan
@@ -123,3 +123,25 @@ def transport(
     plus = -nF * D_plus * (grad_c + c * field) + c * fluid
     minus = -nF * D_minus * (grad_c - grad_cfc - (c - cfc) * field) + (c - cfc) * fluid
     return Transport(fluid, plus, minus)
+
+
+def own_conductances(
+    material: Material, J: CoefficientFunction, c: CoefficientFunction, cfc: CoefficientFunction
+) -> tuple[CoefficientFunction, CoefficientFunction]:
+    """How much fluid a gradient of p drives [mm⁴/(N s)], and how many cations one of c [mm²/s], by `transport`:
+
+        fluid    L = K (1 − D_L cfc/Θ),
+        cations  nF D₊ + |D₋ − D₊| c (nF D₊ + Rθ K cfc)/Θ + 2 |1 − φ| Rθ c L.
+
+    The moduli stand for D₋ − D₊ and 1 − φ (times at most c L): the fluxes of unlike signs do not make a penalty negative.
+    """
+    RT, nF = material.RT, porosity(J, material)
+    K = permeability(J, material)
+    D_plus, D_minus = diffusivities(nF, material)
+    D_L = cfc * K * RT / nF
+    conductance = D_plus * c + D_minus * (c - cfc) + D_L * cfc
+    fluid = K * (1 - D_L * cfc / conductance)
+    cations = nF * D_plus + Norm(CF(D_minus - D_plus)) * c * nF * (D_plus + D_L) / conductance
+    if material.phi != 1:
+        cations = cations + 2 * abs(1 - material.phi) * RT * c * fluid
+    return fluid, cations

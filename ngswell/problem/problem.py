@@ -20,6 +20,9 @@ from ngswell.schedules import Clock
 from ngswell.setup.setup import Setup
 from ngswell.setup.snapshot import Snapshot
 
+CONDUCTANCES = {"fluid": "K", "cations": "D_plus"}
+"""The parameter that lets through what each balance is about."""
+
 
 class Problem(Discretisation):
     """The equations of one step of backward Euler, or of one stage of a Runge–Kutta step:
@@ -72,7 +75,9 @@ class Problem(Discretisation):
             multipliers = dict(zip(self.model.balanced, pairs, strict=True)) if treatment.multipliers else {}
             excess = self.model.excess(state, self.baths[bath.boundary])
             h = cell_size(self.mesh, bath.boundary)
-            terms += treatment.terms(Contact(bath.boundary, state, excess, tested, multipliers, h))
+            sizes = {name: self.setup.material.largest(of, self.mesh) / h for name, of in CONDUCTANCES.items()}
+            order = self.model.order
+            terms += treatment.terms(Contact(bath.boundary, state, excess, tested, multipliers, h, order, sizes))
         return terms
 
     def _bath_loads(self, u: Any, v: Any) -> list[Term]:

@@ -35,6 +35,9 @@ LONGEST, SHORTEST = 1e12, 1e-12
 SHRUNK = 1e-6
 """Relaxation gives up when its steps have fallen below this share of the longest that succeeded."""
 
+MOST_STEPS = 300
+"""Steps that relaxation tries. To rest it takes some 30 to 60; without a state of rest it might creep on for ever."""
+
 
 def equilibrate(
     setup: Setup,
@@ -113,7 +116,9 @@ class _Rest:
         problem = self.problem
         problem.initialise()
         step, state, longest = STATIONARY, problem.vector.copy(), 0.0
-        while step >= max(SHORTEST, SHRUNK * longest):
+        for _ in range(MOST_STEPS):
+            if step < max(SHORTEST, SHRUNK * longest):
+                break
             problem.begin_step(self.time, step)
             if self.newton.solve(problem, self.factorisation).failure is None:
                 if step == STATIONARY:

@@ -85,36 +85,29 @@ def compression(quick: bool) -> list[Attempt]:
         make = partial(pressed, TABLE_1, load, *choice)
         add("1 % left, charged", f"{name}, by levels", make, start=partial(by_levels, choice, load, 8, 100.0))
         add("1 % left, charged block", f"{name}, at once", partial(make, block=True), steps=Adaptive(1e-2))
-    return found + beyond(quick)
+    return found + beyond()
 
 
-def beyond(quick: bool) -> list[Attempt]:
-    """Loads under which there is no equilibrium: µ (1 − nS0²)/nS0 and 1 % more, and five times that, at once."""
+def beyond() -> list[Attempt]:
+    """Loads under which there is no equilibrium: µ (1 − nS0²)/nS0 and 1 % more, and five times that.
+
+    Where K falls to nothing with the fluid, a prescribed bath still asks for what cannot be; a weak one would close, and the
+    column collapse for ever longer.
+    """
     nS0 = SOFT.number("nS0")
     limit = SOFT.number("mu") * (1 - nS0**2) / nS0
+    fading = replace(SOFT, permeability=PowerLaw(m=2.0))
+    at_once, huge = {"steps": Adaptive(1e-2)}, {"steps": Fixed(1e4)}
+    rest: dict[str, Any] = {"steps": Fixed(1.0), "start": directly}
+    cases: list[tuple[str, Material, float, str, str, dict[str, Any]]] = [
+        ("", SOFT, 1.01 * limit, "Potential", "at once", at_once),
+        ("", SOFT, 1.01 * limit, "Concentration", "equilibrate", rest),
+        ("", SOFT, 5 * limit, "Concentration", "huge steps", huge),
+        (", K → 0", fading, 1.01 * limit, "Potential", "equilibrate", rest),
+    ]
     found = []
-    for case, material in (("", SOFT), (", K → 0", replace(SOFT, permeability=PowerLaw(m=2.0)))):
-        for load in (1.01 * limit,) if quick else (1.01 * limit, 5 * limit):
-            for name, choice in DEFAULTS.items():
-                ways: dict[str, dict[str, Any]] = {
-                    "at once": {"steps": Adaptive(1e-2)},
-                    "huge steps": {"steps": Fixed(1e4)},
-                    "equilibrate": {"steps": Fixed(1.0), "start": directly},
-                }
-                for way, options in ways.items():
-                    if quick and way == "huge steps":
-                        continue
-                    found.append(
-                        attempt(
-                            f"no equilibrium, {load:.3g} N/mm²{case}",
-                            f"{name}, {way}",
-                            partial(pressed, material, load, *choice),
-                            1e5,
-                            "passing is wrong",
-                            never,
-                            0.0,
-                            newton=ACCURATE,
-                            **options,
-                        )
-                    )
+    for case, material, load, name, way, options in cases:
+        make = partial(pressed, material, load, *DEFAULTS[name])
+        title, variant = f"no equilibrium, {load:.3g} N/mm²{case}", f"{name}, {way}"
+        found.append(attempt(title, variant, make, 1e5, "passing is wrong", never, 0.0, newton=ACCURATE, **options))
     return found

@@ -2,9 +2,9 @@
 
 Families, with both models, and every stable treatment of a bath where it makes a difference: `bath_range` and `penalties`
 (`baths.py`), `sudden_steps` and `cycles` (`time.py`), `bonded` and `releases` (`bonded.py`), `charge`, `contrasts`,
-`corner`, `compression`, `swelling`, `cells`, `joints` and `wrinkles` (each in the file of its name). The CSV has a row an
-attempt; docs/hard_cases.md says what is compared and why each bound is what it is. An attempt is `wrong` if its error
-exceeds its bound, its ledger does not close, or it leaves fields that are not finite and admissible. Numbers:
+`corner`, `compression`, `swelling`, `cells`, `joints`, `treatments` and `wrinkles` (each in the file of its name). The CSV
+has a row an attempt; docs/hard_cases.md says what is compared and why each bound is what it is. An attempt is `wrong` if its
+error exceeds its bound, its ledger does not close, or it leaves fields that are not finite and admissible. Numbers:
 
 - `FAMILY_passes`, `FAMILY_stops` (StepError), `FAMILY_refused` (InputError), `FAMILY_wrong`: attempts;
 - `attempts`, `passes`, `stops`, `refused`, `wrong`: of all families;
@@ -34,6 +34,7 @@ from tqdm import tqdm
 from studies.hard_cases import baths, bonded, cells, charge, compression, contrasts, corner, joints, swelling, time, wrinkles
 from studies.hard_cases.attempt import Attempt
 from studies.hard_cases.figure import draw
+from studies.hard_cases.treatments import treatments
 from studies.output import Findings
 
 FAMILIES: dict[str, Callable[[bool], list[Attempt]]] = {
@@ -44,6 +45,7 @@ FAMILIES: dict[str, Callable[[bool], list[Attempt]]] = {
         time.sudden_steps,
         contrasts.contrasts,
         baths.penalties,
+        treatments,
         time.cycles,
         corner.corner,
         bonded.bonded,

@@ -160,7 +160,7 @@ PIECES = {
     Blend: [RAMPS, RAMPS, st.sampled_from([x, CF(0.5), 0.25])],
     Bath: [NAMES, HISTORIES, st.floats(-1e3, 1e3), TREATMENTS],
     Penalty: [log_uniform(1e-6, 1e6)],
-    Nitsche: [log_uniform(1e-3, 1e6), st.sampled_from(["symmetric", "skew", "none"])],
+    Nitsche: [log_uniform(20.0, 1e6), st.sampled_from(["symmetric", "skew", "none"])],
     Lagged: [st.sampled_from([None, InnerLayer(), Averaged(), LeastSquares()])],
     LeastSquares: [st.integers(0, 6), st.tuples(st.floats(0, 10), st.floats(1, 10))],
     PowerLaw: [st.floats(0, 50)],

@@ -69,8 +69,8 @@ def test_a_soft_lagged_column_grows():
 class PrintedPenalty(Penalty):
     """The third terms of (27) and (32) on the side on which they are printed."""
 
-    def factors(self, material, h):
-        for_p, for_c = super().factors(material, h)
+    def factors(self, contact):
+        for_p, for_c = super().factors(contact)
         return -for_p, -for_c
 
 

@@ -8,9 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from ngsolve import Norm
-
-from ngswell import Penalty, Role, Scene, Term
+from ngswell import Penalty, Scene, Term
 from ngswell.baths.treatment import Contact
 from ngswell.models.model import Model
 
@@ -20,20 +18,7 @@ class PenaltyFromCells(Penalty):
     """The paper's penalty, with all derivatives."""
 
     def terms(self, contact: Contact) -> list[Term]:
-        state = contact.state
-        stretch = Norm(state.cofactor * state.kinematics.normal)
-        factors = dict(zip(contact.excess, self.factors(state.material, contact.h), strict=True))
-        return [
-            Term(
-                balance,
-                "efflux",
-                factors[balance] * value * contact.tests[balance] * stretch,
-                role=Role.EFFLUX,
-                boundary=contact.boundary,
-                normal_derivatives=True,
-            )
-            for balance, value in contact.excess.items()
-        ]
+        return contact.effluxes(*self.factors(contact), in_cells=True)
 
 
 def from_cells(scene: Scene, model: Model) -> Scene:

@@ -27,7 +27,7 @@ def test_models_name_their_outputs_alike():
 def test_descriptions_name_the_model_and_the_treatment():
     text = strip(Nitsche()).describe()
     assert "fluid: storage, seepage, efflux on top, adjoint on top" in text
-    assert "bath on top: Nitsche, symmetric adjoint, γ = 20" in text
+    assert "bath on top: Nitsche, symmetric adjoint, γ = 50" in text
     assert "adjoint on" not in strip(Nitsche(adjoint="none")).describe()
     text = strip(Multiplier()).describe()
     assert "efflux of fluid 2, efflux of cations 2" in text  # linear traces on the one edge of the strip
