@@ -20,7 +20,7 @@ from ngswell.setup.snapshot import Snapshot
 from ngswell.stepping.steps import StepReport
 from ngswell.version import __version__
 
-FORMAT = 3
+FORMAT = 4
 """Number of the file format: what an entry is called and means."""
 
 

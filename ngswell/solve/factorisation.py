@@ -12,6 +12,9 @@ from ngswell.files import Tree
 from ngswell.problem.problem import Problem
 from ngswell.solve.direct import LinearSolver
 
+FASTEST = 0.1
+"""An old matrix is not trusted to contract by more: the rate of its first solves does not hold for those of later steps."""
+
 
 class Point(NamedTuple):
     """Where a matrix is dr/dx: time and step [s], and fields."""
@@ -58,7 +61,10 @@ class Factorisation:
     def left(self, change: float) -> float:
         """What further corrections with it would add up to, after one of the size `change`: a geometric series."""
         rate = self._contraction
-        return change if rate is None or not self.slowest else change * min(1.0, rate / (1 - rate))
+        if rate is None or not self.slowest:
+            return change
+        rate = max(rate, FASTEST)
+        return change * min(1.0, rate / (1 - rate))
 
     def renew(self, problem: Problem) -> bool:
         """Linearise and factorise at the present fields; False if the matrix is singular or not finite."""

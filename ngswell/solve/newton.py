@@ -14,6 +14,12 @@ from ngswell.problem.admissible import Violation
 from ngswell.problem.problem import Problem
 from ngswell.solve.factorisation import Factorisation
 
+ROUND_OFF = 1e-13
+"""Share of a reference size that no correction is asked to be below for the sake of small `shares`."""
+
+STAGNANT = 1e-11
+"""There a correction below this share of a reference size that does not shrink any more is round-off as well."""
+
 SHORTEST = 1e-12
 """Share of a correction below which keeping the fields admissible leaves none of it."""
 
@@ -57,16 +63,22 @@ class DampedNewton:
             slowest=checks.number("DampedNewton: slowest", self.slowest, low=0.0, high=0.99, hint="0 renews every matrix"),
         )
 
-    def solve(self, problem: Problem, factorisation: Factorisation) -> Outcome:
-        """Iterate from the fields of `problem`, in place."""
-        return _Iteration(self, problem, factorisation).run()
+    def solve(self, problem: Problem, factorisation: Factorisation, shares: dict[str, float] | None = None) -> Outcome:
+        """Iterate from the fields of `problem`, in place. In the test of convergence, by unknown, `shares` of the references
+        take their place."""
+        return _Iteration(self, problem, factorisation, shares or {}).run()
 
 
 class _Iteration:
     """One nonlinear solve: the fields on their way from the first iterate to the solution."""
 
-    def __init__(self, method: DampedNewton, problem: Problem, factorisation: Factorisation) -> None:
+    def __init__(
+        self, method: DampedNewton, problem: Problem, factorisation: Factorisation, shares: dict[str, float]
+    ) -> None:
         self.method, self.problem, self.factorisation = method, problem, factorisation
+        self.small = bool(shares)
+        least = min(1.0, ROUND_OFF / method.tolerance)
+        self.wanted = {name: max(shares.get(name, 1.0), least) * size for name, size in problem.references.items()}
         vectors = (problem.fields.vec.CreateVector() for _ in range(4))
         self.residual, self.correction, self.simplified, self._gap = vectors
         self.correction[:] = 0.0
@@ -91,7 +103,7 @@ class _Iteration:
             if not accepted:  # the matrix was an old one
                 fresh, known = True, False
                 continue
-            if damping == 1.0 and self.factorisation.left(self._size(self.simplified)) <= self.method.tolerance:
+            if damping == 1.0 and self._converged(self.simplified):
                 return self._finish()
             known = damping == 1.0 and self.factorisation.usable
             fresh = not known
@@ -115,13 +127,15 @@ class _Iteration:
             self.beyond = refused or (self.beyond if damping < 1.0 else None)
             if refused is None:
                 least = max(least, method.least_damping * damping)
-                if damping == 1.0 and (before if fresh else self.factorisation.left(before)) <= method.tolerance:
+                if damping == 1.0 and self._converged(self.correction, fresh):
                     return self._success(), True, damping
                 problem.residual(self.residual)
                 if self._solve(self.simplified):
                     rate = self._size(self.simplified) / before
                     if rate <= 1 - damping / 4:
                         break
+                    if self.small and rate * before <= STAGNANT:
+                        return self._success(), True, damping
             if not fresh:
                 break
             damping /= 2
@@ -154,10 +168,15 @@ class _Iteration:
         self._gap.FV().NumPy()[:] = excess
         return self.factorisation.solve(self.residual, solution, self._gap)
 
-    def _size(self, change: BaseVector) -> float:
+    def _converged(self, change: BaseVector, fresh: bool = False) -> bool:
+        """Whether what is left after a correction, of a `fresh` matrix the correction itself, is below the tolerance."""
+        size = self._size(change, self.wanted)
+        return (size if fresh else self.factorisation.left(size)) <= self.method.tolerance
+
+    def _size(self, change: BaseVector, units: dict[str, float] | None = None) -> float:
         """The largest coefficient of any field, in units of its reference."""
-        problem, values = self.problem, change.FV().NumPy()
-        return max(float(np.abs(values[problem.ranges[n]]).max()) / problem.references[n] for n in problem.names)
+        problem, values, units = self.problem, change.FV().NumPy(), units or self.problem.references
+        return max(float(np.abs(values[problem.ranges[n]]).max()) / units[n] for n in problem.names)
 
     def _success(self) -> Outcome:
         violation = self.problem.admissible.violation(solution=True)

@@ -14,7 +14,14 @@ from ngswell.setup.snapshot import Snapshot
 from ngswell.solve.factorisation import Factorisation
 from ngswell.solve.newton import DampedNewton, Outcome
 from ngswell.stepping.schemes import Scheme
+from ngswell.stepping.sizes import Sizes
 from ngswell.stepping.steps import Stage
+
+SETTLING = DampedNewton(tolerance=1e-10)
+"""For what happens at once."""
+
+ROUGH = DampedNewton(tolerance=0.1, most_iterations=8, slowest=0.5)
+"""For what is only to be known by its size."""
 
 Points = list[tuple[float, NDArray]]
 """Times [s] and states."""
@@ -39,8 +46,11 @@ class Attempts:
     """Takes steps of a problem from an accepted state. With `with_slopes`, also those of backward Euler tell the slope that
     the next step of a scheme with an explicit start begins with."""
 
-    def __init__(self, problem: Problem, newton: DampedNewton, factorisation: Factorisation, with_slopes: bool) -> None:
+    def __init__(
+        self, problem: Problem, newton: DampedNewton, factorisation: Factorisation, with_slopes: bool, sizes: Sizes | None
+    ) -> None:
         self.problem, self.newton, self.factorisation, self.with_slopes = problem, newton, factorisation, with_slopes
+        self.sizes = sizes  # None: Newton's method takes natural ones
         self._work = [problem.fields.vec.CreateVector() for _ in range(2)]
 
     def first_slope(self) -> NDArray:
@@ -61,10 +71,32 @@ class Attempts:
             return self._runge_kutta(scheme, start, past, slope, end)
         return self._backward_euler(start, past, end)
 
+    def settle(self, start: Snapshot, dt: float) -> Attempt:
+        """A step of backward Euler `dt` so short that it only takes what loads and baths change at once.
+
+        Solved to round-off: contents differ by little, and their balance is to close. The slope is R itself.
+        """
+        self.problem.begin_step(start.time + dt, dt)
+        outcome = SETTLING.solve(self.problem, self.factorisation)
+        if outcome.failure:
+            return Attempt(outcome.iterations, outcome.failure)
+        values = self.problem.vector.copy()
+        stages = (Stage(dt, start.time + dt, values),)
+        return Attempt(outcome.iterations, None, stages, values - start.values, 1.0, self.first_slope())
+
+    def expected(self, start: Snapshot, end: float) -> NDArray | None:
+        """About the state at `end` [s], by one step of backward Euler, or none; the fields are left as they were."""
+        self.problem.begin_step(end, end - start.time)
+        self.factorisation.prepare(end - start.time)
+        outcome = ROUGH.solve(self.problem, self.factorisation)
+        values = None if outcome.failure else self.problem.vector.copy()
+        self.problem.restore(start)
+        return values
+
     def _solve(self, dt: float) -> Outcome:
         """The nonlinear system of a stage whose step of backward Euler is `dt`."""
         self.factorisation.prepare(dt)
-        return self.newton.solve(self.problem, self.factorisation)
+        return self.newton.solve(self.problem, self.factorisation, self.sizes.shares() if self.sizes else None)
 
     def _contents(self) -> NDArray:
         self.problem.contents(self._work[0])

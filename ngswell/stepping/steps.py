@@ -14,13 +14,13 @@ from ngswell.errors import InputError, Rejection
 from ngswell.solve.newton import DampedNewton
 from ngswell.stepping.schemes import BACKWARD_EULER, ESDIRK4, Scheme
 
-NEWTON_SHARE = 3e-3
-"""What the nonlinear solves may leave of a time error."""
+NEWTON_SHARE = 2e-3
+"""What a nonlinear solve may leave of a time error: rates, which are differences of contents, multiply it in the stages."""
 
 SLOWEST = 0.3
 """Contraction of the Newton iteration from which on a new matrix is cheaper than more iterations with the old one."""
 
-FIRST = 0.1
+FIRST = 0.07
 """Measured start after a kink: this share of the interval to the next for a tolerance of one, less by the scheme's order."""
 
 
@@ -112,11 +112,14 @@ class Fixed:
 
 @dataclass(frozen=True)
 class Adaptive:
-    """Steps whose estimated local error stays below `tolerance`.
+    """Steps whose estimated error stays below `tolerance`.
 
-    The error is that of the embedded solution; for backward Euler, the difference to the linear extrapolation, scaled. Root
-    mean square per field, relative to the largest change that the field has undergone so far (or a small fraction of its
-    natural size).
+    Errors are root mean squares over the body, relative to what the run itself does: the largest change of the field since
+    it began, so far or, by one rough step ahead, until the next kink. With ESDIRK4 the displacement at any time of the run
+    is then within three times the tolerance of its largest change (the other fields within that of theirs, or of a tenth of
+    the displacement's in natural sizes, whichever is larger). The error is that of the embedded solution times a factor of
+    safety. With backward Euler, whose error is the difference to linear extrapolation, scaled, the tolerance bounds what one
+    step adds, and the error reached goes with its root. Changes below 1e-7 of a natural size count as round-off.
     """
 
     tolerance: float = 1e-3

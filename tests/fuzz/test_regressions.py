@@ -42,7 +42,7 @@ def scene(**changes) -> Scene:
 class Balks(DampedNewton):
     """Fails on the first of two attempts at a step, as where the extrapolated start is not admissible."""
 
-    def solve(self, problem, factorisation):
+    def solve(self, problem, factorisation, shares=None):
         attempts = self.__dict__["attempts"] = self.__dict__.get("attempts", -1) + 1
         balks = Outcome(0, Failure(Reason.STALLED, "u", (0.0,)))
         return balks if attempts % 2 else super().solve(problem, factorisation)

@@ -80,7 +80,7 @@ class _GivenUp(Exception):
 class Undamped(DampedNewton):
     """Newton's method without damping and without looking at what is admissible, as a short script has it."""
 
-    def solve(self, problem: Problem, factorisation: Factorisation) -> Outcome:
+    def solve(self, problem: Problem, factorisation: Factorisation, shares: dict[str, float] | None = None) -> Outcome:
         residual, correction = (problem.fields.vec.CreateVector() for _ in range(2))
         for count in range(1, self.most_iterations + 1):
             problem.residual(residual)
@@ -102,8 +102,8 @@ class Watched(DampedNewton):
     clock: Area = field(default_factory=Area)
     failures: list[tuple[float, Failure]] = field(default_factory=list)
 
-    def solve(self, problem: Problem, factorisation: Factorisation) -> Outcome:
-        outcome = self.method.solve(problem, factorisation)
+    def solve(self, problem: Problem, factorisation: Factorisation, shares: dict[str, float] | None = None) -> Outcome:
+        outcome = self.method.solve(problem, factorisation, shares)
         if outcome.failure is not None:
             self.failures.append((float(self.clock.time[-1]), outcome.failure))
             if len(self.failures) >= PATIENCE:

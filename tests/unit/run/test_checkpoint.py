@@ -473,11 +473,11 @@ def test_other_versions(written, tmp_path, monkeypatch):
     with np.load(written) as archive:
         arrays = dict(archive)
     said = json.loads(arrays["header"].item())
-    assert said["format"] == 3
-    for other in (2, 4):
+    assert said["format"] == 4
+    for other in (3, 5):
         arrays["header"] = np.array(json.dumps({**said, "format": other, "fields": "elsewhere"}).encode())
         np.savez(tmp_path / "other.npz", **arrays)
-        with pytest.raises(InputError, match=rf"checkpoint format {other}.*reads 3; go on with the version that wrote it"):
+        with pytest.raises(InputError, match=rf"checkpoint format {other}.*reads 4; go on with the version that wrote it"):
             read_checkpoint(tmp_path / "other.npz")
     monkeypatch.setattr("ngswell.run.restart.__version__", "0.0.9")
     with pytest.raises(InputError, match=rf"written by {restart.versions}.*this is ngswell 0.0.9"):
