@@ -7,6 +7,10 @@ corner; `area` of the block): `SCENE_TOLERANCE_QUANTITY_error`, the largest over
 displacement or the initial area; `SCENE_TOLERANCE_steps`; `column_..._seconds` [s] of the time loop. The same for backward
 Euler (`..._euler_...`), for comparison, and `largest_ratio`, `smallest_ratio`: errors reached over asked, of the scene's
 larger error at each tolerance; `smallest_ratio_from_1e-3` without the tolerance of 1e-2.
+
+Then random scenes (`random_runs`, `random_scenes` of them): `worst_error_over_tolerance_TOLERANCE` and
+`median_error_over_tolerance_TOLERANCE`: the largest error of the displacement in a run, relative to its largest change,
+over the tolerance.
 """
 
 from __future__ import annotations
@@ -34,12 +38,15 @@ from ngswell import (
 from ngswell.models.model import Model
 from ngswell.setup.snapshot import Snapshot
 from ngswell.stepping.schemes import Scheme
+from studies.choices.random_runs import errors, random_run
 from studies.output import Findings, cost, letter_panels
 from studies.scenes import COLUMN_HEIGHT, END, FALLING, HEIGHT, INITIAL, confined_column, free_swelling_block, with_model
 
 MODELS = (Concentration(), Potential())
 TOLERANCES = (1e-2, 1e-3, 1e-4, 1e-5)
 REFERENCE = 1e-7
+RANDOM, FEW = range(30), (3, 7, 17)
+"""Numbers of the random scenes, and of those of the quick size: a column, a block and a disc."""
 EXACT = DampedNewton(tolerance=1e-11, slowest=0.3)
 
 
@@ -98,14 +105,20 @@ def run(quick: bool = False) -> Findings:
     cells = 4 if quick else 8
     bodies = [column(model) for model in MODELS] + [block(model, cells) for model in MODELS]
     reached = [error for body in bodies for error in compute(body, TOLERANCES[:1] if quick else TOLERANCES[:3])]
-    found = numbers(reached) | {"mesh": f"60 segments; {cells} x {cells} quadrilaterals"} | cost([r.result for r in reached])
+    random = [errors(random_run(number), TOLERANCES) for number in (FEW if quick else RANDOM)]
+    found = (
+        numbers(reached)
+        | of_random(random)
+        | {"mesh": f"60 segments; {cells} x {cells} quadrilaterals"}
+        | cost([r.result for r in reached])
+    )
     header = ("scene", "scheme", "tolerance", "displacement_error", "area_error", "steps", "seconds")
     rows = [
         (r.body, r.scheme.name, r.tolerance, r.errors["displacement"], r.errors.get("area", ""),
          len(r.result.steps), r.result.seconds)
         for r in reached
     ]  # fmt: skip
-    return Findings(draw(reached), header, rows, found)
+    return Findings(draw(reached, random), header, rows, found)
 
 
 def compute(body: SwellingBody, of_euler: tuple[float, ...]) -> list[ReachedError]:
@@ -142,15 +155,25 @@ def numbers(reached: list[ReachedError]) -> dict[str, float | int | str]:
     return found
 
 
+def of_random(random: list[dict[float, float]]) -> dict[str, float | int]:
+    """Largest and median error over each tolerance."""
+    found: dict[str, float | int] = {"random_scenes": len(random)}
+    for tolerance in TOLERANCES:
+        ratios, short = [run[tolerance] for run in random], f"{tolerance:.0e}".replace("e-0", "e-")
+        found[f"worst_error_over_tolerance_{short}"] = max(ratios)
+        found[f"median_error_over_tolerance_{short}"] = float(np.median(ratios))
+    return found
+
+
 MARKERS = {"column_concentration": "v", "column_potential": "^", "block_concentration": "s", "block_potential": "o"}
 
 
-def draw(reached: list[ReachedError]) -> Figure:
-    """Errors reached over errors asked for, a panel a scheme."""
-    figure, axes = plt.subplots(1, 2, figsize=(9.0, 3.8), sharey=True)
+def draw(reached: list[ReachedError], random: list[dict[float, float]]) -> Figure:
+    """Errors reached over errors asked for, a panel a scheme, and those of random scenes."""
+    figure, axes = plt.subplots(1, 3, figsize=(10.5, 3.8), sharey=True)
     asked = np.array(TOLERANCES)
-    for ax, scheme, title in zip(axes, (ESDIRK4, BACKWARD_EULER), ("ESDIRK4(3)", "backward Euler"), strict=True):
-        ax.fill_between(asked, asked / 3, 3 * asked, color="0.9", label="within a factor of three")
+    for ax, scheme, title in zip(axes[:2], (ESDIRK4, BACKWARD_EULER), ("ESDIRK4(3)", "backward Euler"), strict=True):
+        ax.fill_between(asked, asked / 100, 3 * asked, color="0.9", label="at most three times the tolerance")
         ax.loglog(asked, asked, "k-", lw=0.6)
         for name, marker in MARKERS.items():
             mine = [run for run in reached if run.body == name and run.scheme is scheme]
@@ -160,6 +183,11 @@ def draw(reached: list[ReachedError]) -> Figure:
                 errors = [run.errors[quantity] for run in mine]
                 ax.loglog(asked[: len(errors)], errors, line, label=f"{name.replace('_', ', ')}: {quantity}", **style)
         ax.set(title=title, xlabel="tolerance asked for [-]")
+    axes[2].fill_between(asked, asked / 100, 3 * asked, color="0.9")
+    axes[2].loglog(asked, asked, "k-", lw=0.6)
+    for run in random:
+        axes[2].loglog(asked, [run[tolerance] * tolerance for tolerance in asked], "ko", mfc="w", ms=3, lw=0)
+    axes[2].set(title=f"ESDIRK4(3), {len(random)} random scenes", xlabel="tolerance asked for [-]")
     axes[0].set(ylabel="largest error in time reached [-]")
     letter_panels(axes)
     figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=3, fontsize=8)
