@@ -19,6 +19,7 @@ from ngswell.baths.prescribed import Essential, Frozen
 from ngswell.baths.treatment import Prescribed, Weak
 from ngswell.calls import refusing
 from ngswell.errors import (
+    ExtrapolationWarning,
     InputError,
     InstabilityError,
     InstabilityWarning,
@@ -68,15 +69,16 @@ from ngswell.streams import CSV
 from ngswell.version import __version__ as __version__
 
 __all__ = [
-    "BACKWARD_EULER", "CSV", "ESDIRK4", "TABLE_1", "TABLE_2", "VTK", "Adaptive", "Area", "Averaged", "Axisymmetric", "Bath",
-    "Blend", "Call", "Checkpoint", "Coarseness", "Concentration", "Confined", "DampedNewton", "Essential", "Fixed",
-    "Frozen", "HolmesMow", "InnerLayer", "InputError", "InstabilityError", "InstabilityWarning", "Integral", "Lagged",
-    "LeastSquares", "Ledger", "Load", "LocalDonnan", "MackieMeares", "Material", "Multiplier", "NeoHookean",
-    "NgswellError", "Nitsche", "Observer", "Outflow", "OutputError", "OverlapWarning", "Penalty", "Pin", "PlaneStrain",
-    "Potential", "PowerLaw", "Prescribed", "Probe", "Problem", "Progress", "Ramp", "Reason", "Restart", "Result", "Role",
-    "Roller", "Scene", "Setup", "Sine", "Snapshot", "Snapshots", "Spatial", "Spline", "Stability", "StepError", "Support",
-    "Symmetry", "Term", "Traction", "TwoLevelSolver", "Uncharged", "Weak", "Weight", "box", "check_mesh", "column",
-    "from_occ", "read_checkpoint", "read_mesh", "rectangle",
+    "BACKWARD_EULER", "CSV", "ESDIRK4", "TABLE_1", "TABLE_2", "VTK", "Adaptive", "Area", "Averaged", "Axisymmetric",
+    "Bath", "Blend", "Call", "Checkpoint", "Coarseness", "Concentration", "Confined", "DampedNewton", "Essential",
+    "ExtrapolationWarning", "Fixed", "Frozen", "HolmesMow", "InnerLayer", "InputError", "InstabilityError",
+    "InstabilityWarning", "Integral", "Lagged", "LeastSquares", "Ledger", "Load", "LocalDonnan", "MackieMeares",
+    "Material", "Multiplier", "NeoHookean", "NgswellError", "Nitsche", "Observer", "Outflow", "OutputError",
+    "OverlapWarning", "Penalty", "Pin", "PlaneStrain", "Potential", "PowerLaw", "Prescribed", "Probe", "Problem",
+    "Progress", "Ramp", "Reason", "Restart", "Result", "Role", "Roller", "Scene", "Setup", "Sine", "Snapshot",
+    "Snapshots", "Spatial", "Spline", "Stability", "StepError", "Support", "Symmetry", "Term", "Traction",
+    "TwoLevelSolver", "Uncharged", "Weak", "Weight", "box", "check_mesh", "column", "from_occ", "read_checkpoint",
+    "read_mesh", "rectangle",
 ]  # fmt: skip
 
 for _name in __all__:

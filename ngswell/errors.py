@@ -24,6 +24,10 @@ class OverlapWarning(UserWarning):
     """A state in which the body overlaps itself."""
 
 
+class ExtrapolationWarning(UserWarning):
+    """An output is asked for at a corner of a cell where the fields overshoot: J − nS0 is not positive there."""
+
+
 class InstabilityWarning(UserWarning):
     """A run or a state of rest is past the limit of stability: perturbations grow that the numbers do not show."""
 

@@ -9,9 +9,9 @@ from functools import cached_property
 from ngsolve import CoefficientFunction, Cof, Det, Id, InnerProduct, Inv, Mesh
 
 from ngswell import checks
-from ngswell.calls import refusing
+from ngswell.calls import refusing, warn
 from ngswell.checks import Field
-from ngswell.errors import InputError
+from ngswell.errors import ExtrapolationWarning, InputError, place
 from ngswell.models.model import FieldContext
 from ngswell.models.term import Kind, Term
 from ngswell.physics import laws
@@ -128,12 +128,16 @@ class SolidState:
     def at(self, point: Sequence[float], name: str) -> float | tuple[float, ...]:
         """An output of a result at a point of the reference configuration [mm], in the unit of `OUTPUT_UNITS`.
 
-        Fluxes and stress are made of derivatives: good inside cells. At a bath take `Outflow`, see docs/limits.md.
+        Fluxes and stress are made of derivatives: good inside cells. At a bath take `Outflow`, see docs/limits.md. Warns
+        with ExtrapolationWarning at a corner where J − nS0 is not positive.
         """
         mesh, point = self.mesh, checks.vector("a point", point, 1e6, "mm")
         if len(point) != mesh.dim or not mesh.Contains(*point):
             raise InputError(f"{point} is not a point of the {mesh.dim}-d body")
-        return self.output(name)(mesh(*point))
+        value, content = self.output(name)(mesh(*point)), self.content(mesh(*point))
+        if content <= 0:
+            warn_of_extrapolation("state.at", content, point)
+        return value
 
     def solid_outputs(self, pore_pressure: CoefficientFunction) -> dict[str, CoefficientFunction]:
         """Displacement, J, nS and total Cauchy stress, 3 × 3 in every motion."""
@@ -143,6 +147,15 @@ class SolidState:
             "nS": laws.solidity(self.J, self.material),
             "stress": extra_stress(self.whole_F, self.material) - pore_pressure * Id(3),
         }
+
+
+def warn_of_extrapolation(what: str, content: float, where: Sequence[float]) -> None:
+    """Say that J − nS0 = `content` is not positive at a point [mm], which no law and no balance has seen."""
+    text = (
+        f"{what}: at {place(where)} mm the fields overshoot, J − nS0 = {content:.3g}, as at the corner where a held side "
+        "meets a free one; J, nS, concentrations and stress there are no result. Remedy: a point inside a cell."
+    )
+    warn(ExtrapolationWarning(text))
 
 
 OUTPUT_UNITS = {

@@ -14,7 +14,7 @@ from ngswell import checks
 from ngswell.errors import InputError
 from ngswell.files import Tree
 from ngswell.mesh.points import integral_on_boundary
-from ngswell.models.solid_state import FLUXES
+from ngswell.models.solid_state import FLUXES, warn_of_extrapolation
 from ngswell.observers.base import Observer
 from ngswell.observers.records import Recorder
 from ngswell.problem.problem import Problem
@@ -27,6 +27,8 @@ class Probe(Recorder):
 
     `Probe((1.1, 0.5), "J", "p")`; then `probe.time` and `probe.values["J"]` are arrays, one row a record. Quantities and
     units are those of `ngswell.models.solid_state.OUTPUT_UNITS`. With `to`, a path or a `CSV`, records go to that file.
+    Fluxes and stress are made of derivatives: good inside cells; at a bath take `Outflow`. Warns with ExtrapolationWarning,
+    once, at a corner where J − nS0 is not positive.
     """
 
     def __init__(
@@ -42,6 +44,7 @@ class Probe(Recorder):
             checks.name("Probe: a quantity", quantity, "displacement")
         self.point, self.quantities = checks.vector("Probe: point", point, 1e6, "mm"), quantities
         super().__init__(when, self.point, *quantities, to=to)
+        self._warned = False
 
     def prepare(self, problem: Problem, begin: float, until: float) -> None:
         if len(self.point) != problem.mesh.dim or not problem.mesh.Contains(*self.point):
@@ -50,6 +53,10 @@ class Probe(Recorder):
 
     def row(self, problem: Problem) -> Mapping[str, Any]:
         point = problem.mesh(*self.point)
+        content = problem.state.content(point)
+        if content <= 0 and not self._warned:
+            self._warned = True
+            warn_of_extrapolation("Probe", content, self.point)
         return {name: field(point) for name, field in self._fields.items()}
 
     @property

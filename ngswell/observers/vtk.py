@@ -8,11 +8,14 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
-from ngsolve import CF, CoefficientFunction, VTKOutput
+import numpy as np
+from ngsolve import CF, CoefficientFunction, VTKOutput, x, y, z
 
 from ngswell import checks
 from ngswell.errors import InputError, OutputError
 from ngswell.files import Tree, alone, check_folder, replacing
+from ngswell.mesh.points import corners
+from ngswell.models.solid_state import warn_of_extrapolation
 from ngswell.observers.base import Observer
 from ngswell.problem.problem import Problem
 
@@ -24,7 +27,8 @@ class VTK(Observer):
     """Writes `path`.pvd and one .vtu file a record, on the reference configuration (warp by "displacement").
 
     All the model's quantities by default, or those named; fluxes and stresses, made of derivatives, mislead at baths, held
-    sides and corners (docs/limits.md). Vectors have three components and stresses nine, as VTK readers
+    sides and corners (docs/limits.md); a corner where J − nS0 is not positive gets an ExtrapolationWarning, once a run.
+    Vectors have three components and stresses nine, as VTK readers
     expect. `subdivision` splits each element edge 2^n times, so that quadratic displacements show. Existing series are
     kept unless `overwrite`; then the old series is removed as a whole, and no other file. One run writes a series at a
     time. Raises OutputError before any computing, and InputError on a 1-d mesh. At every moment the .pvd names complete
@@ -61,6 +65,7 @@ class VTK(Observer):
             names.append("displacement")
         check_folder(self.path.parent, "VTK")
         self._alone.enter_context(alone(self._series, "VTK", rf"{re.escape(self.path.name)}({PIECE})?\.(vtu|pvd)"))
+        self._corners, self._warned = corners(problem.mesh), False
         self._fields = {name: _three_dimensional(outputs[name]) for name in names}
 
     def start(self, problem: Problem, begin: float, until: float) -> None:
@@ -108,6 +113,7 @@ class VTK(Observer):
         return self.path.with_name(self.path.name + (f"_step{number:05d}" if number else "") + ".vtu")
 
     def record(self, problem: Problem, time: float) -> None:
+        self._look_at_corners(problem)
         with replacing(self._piece(len(self._recorded) - 1), "VTK") as new:
             fields, name = self._fields, str(new.with_suffix(""))
             # A writer of its own for each piece: NGSolve's own numbering starts anew in a resumed run.
@@ -116,6 +122,15 @@ class VTK(Observer):
             if not _complete(new):  # NGSolve does not say when the disk is full
                 raise OSError("it is cut short; is the disk full?")
         self._write_series()
+
+    def _look_at_corners(self, problem: Problem) -> None:
+        """Warn, once, where the fields overshoot."""
+        contents = problem.state.content(self._corners).ravel()
+        worst = int(np.argmin(contents))
+        if contents[worst] <= 0 and not self._warned:
+            self._warned = True
+            position = CF((x, y, z)[: problem.mesh.dim])(self._corners[worst : worst + 1])
+            warn_of_extrapolation("VTK", contents[worst], position.ravel())
 
     def _write_series(self) -> None:
         entries = [

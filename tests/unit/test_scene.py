@@ -135,6 +135,7 @@ def test_zero_current_is_named_where_it_is_more_than_conservation_of_charge():
     def named(**changes):
         return "zero current" in strip(None, **{"model": Potential(), "cells": (1, 2), **changes}).describe()
 
+    assert "made of derivatives" in strip(None, cells=(1, 2)).describe()
     assert named(baths=[Bath("top", c=changing), Bath("bottom", c=0.15)])
     assert named(baths=[Bath("top", c=blended)])
     assert named(baths=[Bath("top", c=blended), Bath("bottom", c=Blend(constant, changing, 0.5 + 25 * x))])
