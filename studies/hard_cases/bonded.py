@@ -114,7 +114,7 @@ def bonded(quick: bool) -> list[Attempt]:
     return found
 
 
-def released_body(cells: int, left: float, wet: str, model: Model, treatment: Treatment) -> Scene:
+def released_body(cells: int, left: float, wet: str, model: Model, treatment: Treatment | None = None) -> Scene:
     """A quarter of a square of Table 1 that starts in equilibrium with its bath but for what of p0 is `left` outside."""
     return Scene(
         mesh=rectangle(1.0, 1.0, cells, cells),

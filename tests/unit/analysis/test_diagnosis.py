@@ -31,6 +31,7 @@ from ngswell.analysis.diagnosis import singular_mode
 from ngswell.errors import Reason
 from ngswell.mesh.parts import Sides
 from ngswell.mesh.points import corners, points
+from studies.hard_cases.bonded import released_body
 from tests.scenes import P0, UNCHARGED, confined_column, strip
 
 MODELS = {
@@ -178,23 +179,10 @@ def test_a_run_ends_before_a_cell_turns_over(monkeypatch):
 # -- starts that are out of balance --------------------------------------------------------------------------------------
 
 
-def released(cells, load, **changes):
-    """A body of Table 1 with a bath on one side, under less than the traction that carries its charge."""
-    fields = {
-        "mesh": rectangle(1.0, 1.0, cells, cells),
-        "kinematics": PlaneStrain(),
-        "material": TABLE_1,
-        "supports": [Symmetry("bottom"), Symmetry("left")],
-        "baths": [Bath("right", c=0.15)],
-        "loads": [Traction("top", (0.0, -load)), Traction("right", (-load, 0.0))],
-    }
-    return Scene(**fields | changes)
-
-
 @pytest.mark.parametrize("load", [P0, 0.05])
 def test_what_a_start_leaves_of_its_forces(load):
     """In balance under p0; under less, the top leaves what the load lacks: (p0 − load)/p0 of the pressure's force."""
-    problem = released(3, load).problem
+    problem = released_body(3, load, "right", Potential()).problem
     problem.initialise()
     assert forces_left(problem)[0] == pytest.approx((P0 - load) / P0, abs=1e-6)  # p0 has seven digits
     assert forces_left(problem)[1][1] == 1.0 or load == P0
