@@ -17,6 +17,9 @@ from ngswell.stepping.schemes import BACKWARD_EULER, ESDIRK4, Scheme
 NEWTON_SHARE = 2e-3
 """What a nonlinear solve may leave of a time error: rates, which are differences of contents, multiply it in the stages."""
 
+SMALLEST_TOLERANCE = 1e-12
+"""Below it estimated errors are round-off: with 1e-13 a run on six cells finds no step."""
+
 SLOWEST = 0.3
 """Contraction of the Newton iteration from which on a new matrix is cheaper than more iterations with the old one."""
 
@@ -130,6 +133,10 @@ class Adaptive:
         tolerance = checks.positive("Adaptive tolerance", self.tolerance)
         if tolerance > 1:
             raise InputError(f"Adaptive tolerance = {tolerance:g} is above 1: errors are relative to the changes, take 1e-3")
+        if tolerance < SMALLEST_TOLERANCE:
+            raise InputError(
+                f"Adaptive tolerance = {tolerance:g} is lost in round-off: take {SMALLEST_TOLERANCE:g} or more, such as 1e-3"
+            )
         checks.set_fields(self, tolerance=tolerance)
         if not (checks.is_number(self.largest) and self.largest == inf):
             checks.set_fields(self, largest=checks.positive("Adaptive largest", self.largest, "s"))

@@ -17,6 +17,7 @@ from tests.scenes import FALLING, confined_column, strip
         (lambda: Fixed(math.inf), "finite, got inf"),
         (lambda: Fixed(1.0, "euler"), "scheme has to be BACKWARD_EULER.*'euler'"),
         (lambda: Adaptive(1e300), "above 1"),
+        (lambda: Adaptive(1e-13), "lost in round-off: take 1e-12 or more"),
     ],
 )
 def test_refused(make, words):
