@@ -76,8 +76,7 @@ REMEDIES = {
     ),
     Reason.NOT_ADMISSIBLE: _SQUEEZED,
     Reason.IONS_RUN_OUT: (
-        "Remedies: a bath that changes more slowly, and not from nearly pure water; from nearly pure water, Concentration() "
-        "with Penalty or Multiplier."
+        "Remedies: Penalty or Multiplier in place of Nitsche; a bath that changes more slowly, or not to nearly pure water."
     ),
     Reason.TURNS_OVER: _TURNED,
     Reason.NOT_A_SOLUTION: (

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 _SHAPES = (ET.SEGM, ET.TRIG, ET.QUAD, ET.TET, ET.HEX, ET.PRISM, ET.PYRAMID)
 
-_CORNERS: dict[ET, list[tuple[float, ...]]] = {
+CORNERS: dict[ET, list[tuple[float, ...]]] = {
     ET.SEGM: [(0,), (1,)],
     ET.TRIG: [(0, 0), (1, 0), (0, 1)],
     ET.QUAD: [(0, 0), (1, 0), (1, 1), (0, 1)],
@@ -29,19 +29,19 @@ def points(mesh: Mesh, region: object = VOL, order: int = 4) -> NDArray:
 
 def points_and_corners(mesh: Mesh, region: object, order: int) -> NDArray:
     """The same, and the corners of the elements."""
-    return mesh.MapToAllElements({shape: with_corners(shape, order) for shape in _CORNERS}, region)
+    return mesh.MapToAllElements({shape: with_corners(shape, order) for shape in CORNERS}, region)
 
 
 def with_corners(shape: ET, order: int) -> IntegrationRule:
     """The integration rule of degree `order` on a cell, and its corners with no weight."""
-    rule, corners = IntegrationRule(shape, order), _CORNERS[shape]
+    rule, corners = IntegrationRule(shape, order), CORNERS[shape]
     inside = [point if isinstance(point, tuple) else (point,) for point in rule.points]
     return IntegrationRule([*inside, *corners], [*rule.weights, *(0.0 for _ in corners)])
 
 
 def corners(mesh: Mesh) -> NDArray:
     """Mapped corners of all cells of the body, each from the inside of its cell."""
-    rules = {shape: IntegrationRule(list(places), [0.0] * len(places)) for shape, places in _CORNERS.items()}
+    rules = {shape: IntegrationRule(list(places), [0.0] * len(places)) for shape, places in CORNERS.items()}
     return mesh.MapToAllElements(rules, VOL)
 
 

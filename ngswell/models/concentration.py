@@ -81,6 +81,7 @@ class Concentration:
 
     unknowns: ClassVar[tuple[str, ...]] = ("u", "p", "c", "cfc")
     balanced: ClassVar[dict[str, str]] = {"fluid": "p", "cations": "c"}
+    positive: ClassVar[tuple[str, ...]] = ()
     charge_field: ClassVar[str | None] = "cfc"
     evolving: ClassVar[dict[str, float]] = {"u": 1e-2, "p": 1e-1, "c": 1e-1}  # cfc follows u
 
@@ -116,7 +117,7 @@ class Concentration:
             *s.momentum(s.pore_pressure, v),
             Term("fluid", "storage", s.content * q, Kind.RATE),
             Term("fluid", "seepage", -InnerProduct(flux.fluid, gradient(q))),
-            Term("cations", "storage", s.content * s.c * d, Kind.RATE),
+            Term("cations", "storage", s.content * s.c * d, Kind.RATE, lumps=True),
             Term("cations", "diffusion and convection", -InnerProduct(flux.cations, gradient(d))),
             Term("charge", "projection", (s.content * s.cfc - reference_charge) * r),
         ]
@@ -127,6 +128,9 @@ class Concentration:
 
     def references(self, concentration: float, stress: float, length: float) -> dict[str, float]:
         return {"u": length, "p": stress, "c": concentration, "cfc": concentration}
+
+    def round_off(self, charge: float, RT: float) -> dict[str, float]:
+        return {}
 
     def bounds(self, state: State) -> dict[str, CoefficientFunction]:
         return {"cation concentration": state.c, "c̃² + cfc²/4": state.root_squared}

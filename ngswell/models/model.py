@@ -60,7 +60,7 @@ class Model(Protocol):
     4. `state`: fields and outputs, of trial functions and of results alike;
     5. `terms`: the balances over the body;
     6. `equilibrium`, `excess`: what a bath asks of it;
-    7. `bounds`, `solution_bounds`: what has to stay positive.
+    7. `bounds`, `solution_bounds`: what has to stay positive; `positive`, `round_off`: unknowns that may vanish.
     """
 
     @property
@@ -74,6 +74,9 @@ class Model(Protocol):
     as long as they have changed by less."""
     charge_field: ClassVar[str | None]
     """The unknown that is a continuous field of the fixed charge; None where the charge is that of the point."""
+
+    positive: ClassVar[tuple[str, ...]]
+    """Unknowns that are positive at every vertex, in every iterate."""
 
     def check(self, material: Material, baths: Sequence[BathData]) -> None:
         """Refuse materials and baths that the model cannot mean."""
@@ -101,6 +104,10 @@ class Model(Protocol):
 
     def references(self, concentration: float, stress: float, length: float) -> dict[str, float]:
         """Natural size of each unknown from the scene's largest concentration, shear modulus and length."""
+        ...
+
+    def round_off(self, charge: float, RT: float) -> dict[str, float]:
+        """What round-off leaves undetermined of unknowns where ions vanish beside a `charge` [mol/l]; `RT` is Rθ."""
         ...
 
     def bounds(self, state: Any) -> dict[str, CoefficientFunction]:

@@ -23,6 +23,7 @@ class OnePressure:
 
     order: int = 2
 
+    positive: ClassVar[tuple[str, ...]] = ()
     charge_field: ClassVar[str | None] = None
     unknowns: ClassVar[tuple[str, ...]]
 
@@ -50,6 +51,9 @@ class OnePressure:
 
     def references(self, concentration: float, stress: float, length: float) -> dict[str, float]:
         return {"u": length, self.unknowns[1]: stress}
+
+    def round_off(self, charge: float, RT: float) -> dict[str, float]:
+        return {}
 
     def bounds(self, state: Any) -> dict[str, CoefficientFunction]:
         return {}

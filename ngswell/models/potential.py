@@ -15,6 +15,9 @@ from ngswell.physics import laws
 from ngswell.physics.kinematics import Kinematics
 from ngswell.physics.material import Material
 
+ROOT_OF_ROUND_OFF = 3e-8
+"""Twice the root of the last digit of 1."""
+
 
 @dataclass(frozen=True)
 class State(VirtualBathState):
@@ -42,6 +45,7 @@ class Potential:
 
     order: int = 2
 
+    positive: ClassVar[tuple[str, ...]] = ("salt",)
     charge_field: ClassVar[str | None] = None
     unknowns: ClassVar[tuple[str, ...]] = ("u", "P", "salt")
     balanced: ClassVar[dict[str, str]] = {"fluid": "P", "cations": "salt"}
@@ -71,7 +75,7 @@ class Potential:
             *state.momentum(state.pore_pressure, v),
             Term("fluid", "storage", state.content * q, Kind.RATE),
             Term("fluid", "seepage", -InnerProduct(flux.fluid, gradient(q))),
-            Term("cations", "storage", state.content * state.cations * d, Kind.RATE),
+            Term("cations", "storage", state.content * state.cations * d, Kind.RATE, lumps=True),
             Term("cations", "diffusion and convection", -InnerProduct(flux.cations, gradient(d))),
         ]
 
@@ -80,6 +84,11 @@ class Potential:
 
     def references(self, concentration: float, stress: float, length: float) -> dict[str, float]:
         return {"u": length, "P": stress, "salt": concentration}
+
+    def round_off(self, charge: float, RT: float) -> dict[str, float]:
+        """Stored cations see c̃²/cfc beside cfc: c̃ below the root of round-off times cfc drowns, and P with it."""
+        salt = ROOT_OF_ROUND_OFF * charge
+        return {"salt": salt, "P": 2 * RT * salt}
 
     def bounds(self, state: State) -> dict[str, CoefficientFunction]:
         return {"salt concentration c̃": state.salt}

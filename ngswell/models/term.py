@@ -31,7 +31,8 @@ class Term:
     """One named term of one balance; `name` is for display.
 
     Integrated over `boundary` if that is named, else over the body. On a boundary, fields have tangential derivatives only,
-    unless the term asks for `normal_derivatives`.
+    unless the term asks for `normal_derivatives`. A content that `lumps` is taken at vertices where its
+    integrals fail.
     """
 
     balance: str
@@ -41,6 +42,7 @@ class Term:
     role: Role = Role.INNER
     boundary: str | None = None
     normal_derivatives: bool = False
+    lumps: bool = False
 
     def __str__(self) -> str:
         return f"{self.balance}: {self.name}" + (f" [{self.boundary}]" if self.boundary else "")

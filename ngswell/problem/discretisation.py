@@ -13,6 +13,7 @@ from ngswell import checks
 from ngswell.errors import InputError, place
 from ngswell.mesh.points import points, vertices
 from ngswell.models.model import BathFields, FieldContext
+from ngswell.problem.lumping import Storage
 from ngswell.setup.setup import Setup
 from ngswell.setup.snapshot import Snapshot
 
@@ -60,12 +61,26 @@ class Discretisation:
         return points(self.mesh, VOL, 2 * self.model.order + BONUS_ORDER)
 
     @cached_property
+    def storage(self) -> Storage:
+        """Where contents are lumped."""
+        return Storage(self.mesh, self.kinematics.weight)
+
+    @property
+    def _largest_charge(self) -> float:
+        return self.setup.material.largest("cfc0", self.mesh) * max(map(abs, self.setup.charge.values))
+
+    @cached_property
+    def round_off(self) -> dict[str, float]:
+        """What round-off leaves undetermined of unknowns, in their units."""
+        return self.model.round_off(self._largest_charge, self.setup.material.RT)
+
+    @cached_property
     def references(self) -> dict[str, float]:
         """A size of each unknown that the setup itself sets, so that tolerances need no units."""
         setup = self.setup
         corners = vertices(self.mesh)
         length = float(np.linalg.norm(corners.max(axis=0) - corners.min(axis=0)))
-        charge = setup.material.largest("cfc0", self.mesh) * max(map(abs, setup.charge.values))
+        charge = self._largest_charge
         salts = [value for bath in setup.baths if bath.salt for value in bath.salt.values]
         own = self.model.references(max([charge, *salts]), setup.material.largest("mu", self.mesh), length)
         multipliers = self.names[len(own) :]  # in the units of p and c

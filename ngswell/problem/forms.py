@@ -8,6 +8,7 @@ from ngsolve import CF, VOL, BilinearForm, Integrate, Mesh, Variation, ds, dx
 
 from ngswell.models.term import Kind, Term
 from ngswell.problem.discretisation import BONUS_ORDER, Discretisation
+from ngswell.problem.lumping import VERTEX_RULES
 
 
 def integral(discretisation: Discretisation, term: Term, factor: Any = None) -> Any:
@@ -21,11 +22,31 @@ def integral(discretisation: Discretisation, term: Term, factor: Any = None) -> 
     return Variation(over_body) if term.kind is Kind.ENERGY else over_body
 
 
+def content_integrals(discretisation: Discretisation, term: Term, factor: Any = None) -> list[Any]:
+    """A content that lumps over the cells where contents are integrals, and over those where they are lumped at the corners.
+
+    At a corner no other function than that of its vertex is there.
+    """
+    storage = discretisation.storage
+    of_cell = discretisation.kinematics.weight * term.integrand
+    of_corner = discretisation.storage.vertex_weights * term.integrand
+    if factor is not None:
+        of_cell, of_corner = factor * of_cell, factor * of_corner
+    return [
+        of_cell.Compile() * dx(bonus_intorder=BONUS_ORDER, definedonelements=storage.integrated),
+        of_corner.Compile() * dx(intrules=VERTEX_RULES, definedonelements=storage.lumped),
+    ]
+
+
 def form(discretisation: Discretisation, terms: list[Term], rates: Any = None, condense: bool = False) -> BilinearForm:
     """The sum of terms; those of kind RATE with the factor `rates`, such as 1/Δt."""
     result = BilinearForm(discretisation.space, condense=condense)
     for term in terms:
-        result += integral(discretisation, term, rates if term.kind is Kind.RATE else None)
+        if term.lumps:
+            for part in content_integrals(discretisation, term, rates):
+                result += part
+        else:
+            result += integral(discretisation, term, rates if term.kind is Kind.RATE else None)
     return result
 
 

@@ -5,10 +5,12 @@ from __future__ import annotations
 from functools import cached_property
 from typing import Any
 
+import numpy as np
 from ngsolve import CF, BaseMatrix, BaseVector, BilinearForm, CoefficientFunction, GridFunction, Parameter
 from numpy.typing import NDArray
 
 from ngswell.baths.treatment import Charge, Contact
+from ngswell.mesh.points import corners
 from ngswell.models.model import BathFields, FieldContext
 from ngswell.models.term import Kind, Term
 from ngswell.problem.admissible import Admissible
@@ -22,6 +24,9 @@ from ngswell.setup.snapshot import Snapshot
 
 CONDUCTANCES = {"fluid": "K", "cations": "D_plus"}
 """The parameter that lets through what each balance is about."""
+
+LEFT = 0.1
+"""What a correction leaves at least of what has to be positive at a vertex."""
 
 
 class Problem(Discretisation):
@@ -131,12 +136,47 @@ class Problem(Discretisation):
 
     # -- steps ---------------------------------------------------------------------------------------------------------
 
-    def begin_step(self, time: float, dt: float, guess: NDArray | None = None, charge_share: float = 1.0) -> None:
+    @cached_property
+    def lumps(self) -> bool:
+        """Whether there are contents that may be lumped."""
+        return any(term.lumps for term in self.terms)
+
+    def carried(self, lumped: bool) -> NDArray:
+        """S at the present fields, with contents `lumped` or not from now on: what the vertices hold stays what it is."""
+        self.contents(self._work)
+        before = self._work.FV().NumPy().copy()
+        if lumped == self.storage.is_lumped:
+            return before
+        self.storage.lump(lumped)
+        self.contents(self._work)
+        return np.where(self._beyond_vertices, self._work.FV().NumPy(), before)
+
+    def held(self, rates: NDArray) -> NDArray:
+        """`rates` of contents, without those of functions that hold nothing while contents are lumped."""
+        return np.where(self._beyond_vertices, 0.0, rates) if self.storage.is_lumped and rates.size else rates
+
+    @cached_property
+    def _beyond_vertices(self) -> NDArray:
+        """Which coefficients hold nothing while contents are lumped."""
+        found = np.zeros(self.space.ndof, dtype=bool)
+        for balance in {term.balance for term in self.terms if term.lumps}:
+            found[self.ranges[self.model.balanced[balance]]][self.mesh.nv :] = True
+        return found
+
+    def begin_step(
+        self,
+        time: float,
+        dt: float,
+        guess: NDArray | None = None,
+        charge_share: float = 1.0,
+        old_contents: NDArray | None = None,
+    ) -> None:
         """Prepare the step of backward Euler from the fields to `time`; `guess` as first iterate.
 
-        The prescribed values are not put into the fields: see `gap`.
+        `old_contents` are those of the fields unless they are `carried` over a change of how they are integrated. The
+        prescribed values are not put into the fields: see `gap`.
         """
-        self.contents(self._old_contents)
+        self._old_contents.FV().NumPy()[:] = self.carried(self.storage.is_lumped) if old_contents is None else old_contents
         self._prescribed.remember(Charge.LAST_STEP)
         self._begin(time, dt, guess, charge_share)
 
@@ -150,7 +190,27 @@ class Problem(Discretisation):
         self.set_time(time, charge_share)
         self._prescribed.update()
         if guess is not None:
+            held = self.vector[self._held]
             self.vector[:] = guess
+            self.vector[self._held] = held  # no correction sees it, and extrapolation would let round-off grow
+
+    def keep_positive(self, start: NDArray) -> None:
+        """Where a vertex has lost all of an unknown that is positive, a part of its value at `start`, or of round-off's.
+
+        Next to nothing dr/dx is singular to round-off, and what it says of such a vertex must not hold up all the others.
+        """
+        for name in self.model.positive:
+            part = slice(self.ranges[name].start, self.ranges[name].start + self.mesh.nv)
+            least = np.maximum(start[part], self.round_off[name])
+            self.vector[part] = np.where(self.vector[part] > 0, self.vector[part], LEFT * least)
+
+    def from_above(self, vector: NDArray) -> NDArray:
+        """`vector` with what has to be positive as high everywhere as in the strongest bath at the clock's time."""
+        guess, places = vector.copy(), corners(self.mesh)
+        for name in self.model.positive if self.baths else ():
+            guess[self.ranges[name]] = 0.0
+            guess[self.ranges[name].start :][: self.mesh.nv] = max(np.max(bath.salt(places)) for bath in self.baths.values())
+        return guess
 
     def gap(self) -> NDArray:
         """What the fields exceed the prescribed values by, where there are any; zero elsewhere."""

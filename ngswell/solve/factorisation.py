@@ -17,11 +17,12 @@ FASTEST = 0.1
 
 
 class Point(NamedTuple):
-    """Where a matrix is dr/dx: time and step [s], and fields."""
+    """Where a matrix is dr/dx: time and step [s], fields, and whether contents are lumped."""
 
     time: float
     dt: float
     values: NDArray
+    lumped: bool
 
 
 class Factorisation:
@@ -44,12 +45,12 @@ class Factorisation:
         slow = self._contraction is not None and self._contraction > self.slowest
         return self._ready and not slow and self.slowest > 0
 
-    def prepare(self, dt: float) -> None:
+    def prepare(self, problem: Problem, dt: float) -> None:
         """Before a nonlinear solve with the step `dt` [s]: a matrix of another step contracts no better than they differ."""
         if self._made is None:
             return
         change = abs(1 - dt / self._made.dt)
-        if change > self.slowest:
+        if change > self.slowest or self._made.lumped != problem.storage.is_lumped:
             self._ready = False
         elif self._contraction is not None:
             self._contraction = max(self._contraction, change)
@@ -68,7 +69,7 @@ class Factorisation:
 
     def renew(self, problem: Problem) -> bool:
         """Linearise and factorise at the present fields; False if the matrix is singular or not finite."""
-        at = Point(problem.time, problem.dt.Get(), problem.vector.copy())
+        at = Point(problem.time, problem.dt.Get(), problem.vector.copy(), problem.storage.is_lumped)
         self._ready, self._contraction = False, None
         if not self.solver.renew(problem):
             return False
@@ -90,7 +91,11 @@ class Factorisation:
             kept["contraction"] = np.array(self._contraction)
         for name, point in (("analysed", self._analysed), ("made", self._made)):
             if point is not None:
-                kept[name] = {"at": np.array([point.time, point.dt]), "fields": point.values}
+                kept[name] = {
+                    "at": np.array([point.time, point.dt]),
+                    "fields": point.values,
+                    "lumped": np.array(point.lumped),
+                }
         return kept
 
     def restore(self, problem: Problem, state: Tree) -> None:
@@ -100,6 +105,7 @@ class Factorisation:
                 time, dt = state[name]["at"].tolist()
                 problem.set_time(time)
                 problem.dt.Set(dt)
+                problem.storage.lump(bool(state[name]["lumped"]))
                 problem.vector[:] = state[name]["fields"]
                 self.renew(problem)
         self.solver.factorisations, self.solver.solves = state["counts"].tolist()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf
 
 import numpy as np
@@ -68,14 +68,30 @@ class DampedNewton:
         take their place."""
         return _Iteration(self, problem, factorisation, shares or {}).run()
 
+    def solve_from_above(
+        self, problem: Problem, factorisation: Factorisation, shares: dict[str, float] | None = None
+    ) -> Outcome:
+        """The same from fields whose ions are too many rather than too few.
+
+        Next to nothing, ions are a square that each iteration halves: three times as many are allowed. What is left then is
+        what round-off leaves (`Problem.round_off`), and no vertex loses all at once (`Problem.keep_positive`).
+        """
+        patient = replace(self, most_iterations=3 * self.most_iterations)
+        return _Iteration(patient, problem, factorisation, shares or {}, from_above=True).run()
+
 
 class _Iteration:
     """One nonlinear solve: the fields on their way from the first iterate to the solution."""
 
     def __init__(
-        self, method: DampedNewton, problem: Problem, factorisation: Factorisation, shares: dict[str, float]
+        self,
+        method: DampedNewton,
+        problem: Problem,
+        factorisation: Factorisation,
+        shares: dict[str, float],
+        from_above: bool = False,
     ) -> None:
-        self.method, self.problem, self.factorisation = method, problem, factorisation
+        self.method, self.problem, self.factorisation, self.from_above = method, problem, factorisation, from_above
         self.small = bool(shares)
         least = min(1.0, ROUND_OFF / method.tolerance)
         self.wanted = {name: max(shares.get(name, 1.0), least) * size for name, size in problem.references.items()}
@@ -123,6 +139,8 @@ class _Iteration:
         damping, rate, least = 1.0, inf, SHORTEST
         while True:
             vector[:] = start - damping * self.correction.FV().NumPy()
+            if self.from_above:
+                problem.keep_positive(start)
             refused = problem.admissible.violation()
             self.beyond = refused or (self.beyond if damping < 1.0 else None)
             if refused is None:
@@ -141,6 +159,8 @@ class _Iteration:
             damping /= 2
             if damping < least:
                 vector[:] = start
+                if self.from_above and self._is_round_off():
+                    return self._success(), True, damping
                 if self.beyond:
                     return self._violated(self.beyond.reason, self.beyond), False, damping
                 return self._failed(Reason.STALLED), False, damping
@@ -172,6 +192,12 @@ class _Iteration:
         """Whether what is left after a correction, of a `fresh` matrix the correction itself, is below the tolerance."""
         size = self._size(change, self.wanted)
         return (size if fresh else self.factorisation.left(size)) <= self.method.tolerance
+
+    def _is_round_off(self) -> bool:
+        """Whether a correction that nothing reduces is what round-off leaves of unknowns next to nothing."""
+        left, tolerance = self.problem.round_off, self.method.tolerance
+        units = {name: max(unit, left.get(name, 0.0) / tolerance) for name, unit in self.wanted.items()}
+        return self._size(self.correction, units) <= tolerance
 
     def _size(self, change: BaseVector, units: dict[str, float] | None = None) -> float:
         """The largest coefficient of any field, in units of its reference."""

@@ -65,11 +65,16 @@ class Attempts:
             slope[problem.ranges[name]] = self._work[0].FV().NumPy()[problem.ranges[name]]
         return slope
 
-    def take(self, scheme: Scheme, start: Snapshot, past: Points, slope: NDArray, end: float) -> Attempt:
-        """From `start`, which the fields hold, to `end` [s]; `past` are the points of the step before, if any."""
+    def take(self, scheme: Scheme, start: Snapshot, past: Points, slope: NDArray, end: float, lumped: bool) -> Attempt:
+        """From `start`, which the fields hold, to `end` [s], with contents `lumped` or not.
+
+        `past` are the points of the step before, if any.
+        """
+        contents = self.problem.carried(lumped)
         if scheme.embedded:
-            return self._runge_kutta(scheme, start, past, slope, end)
-        return self._backward_euler(start, past, end)
+            slope = self.problem.held(slope)
+            return self._runge_kutta(scheme, start, past, contents, slope, end)
+        return self._backward_euler(start, past, contents, end)
 
     def settle(self, start: Snapshot, dt: float) -> Attempt:
         """A step of backward Euler `dt` so short that it only takes what loads and baths change at once.
@@ -87,7 +92,7 @@ class Attempts:
     def expected(self, start: Snapshot, end: float) -> NDArray | None:
         """About the state at `end` [s], by one step of backward Euler, or none; the fields are left as they were."""
         self.problem.begin_step(end, end - start.time)
-        self.factorisation.prepare(end - start.time)
+        self.factorisation.prepare(self.problem, end - start.time)
         outcome = ROUGH.solve(self.problem, self.factorisation)
         values = None if outcome.failure else self.problem.vector.copy()
         self.problem.restore(start)
@@ -95,44 +100,61 @@ class Attempts:
 
     def _solve(self, dt: float) -> Outcome:
         """The nonlinear system of a stage whose step of backward Euler is `dt`."""
-        self.factorisation.prepare(dt)
-        return self.newton.solve(self.problem, self.factorisation, self.sizes.shares() if self.sizes else None)
+        self.factorisation.prepare(self.problem, dt)
+        return self.newton.solve(self.problem, self.factorisation, self._shares())
+
+    def _shares(self) -> dict[str, float] | None:
+        return self.sizes.shares() if self.sizes else None
+
+    @property
+    def _from_above(self) -> bool:
+        """Whether a third start may help."""
+        return self.problem.storage.is_lumped and bool(self.problem.model.positive)
+
+    def _solve_from_above(self, dt: float, old: NDArray) -> Outcome:
+        """The same from the `old` state with the salt of the baths, which finds what comes after next to nothing."""
+        self.problem.vector[:] = self.problem.from_above(old)
+        self.factorisation.prepare(self.problem, dt)
+        return self.newton.solve_from_above(self.problem, self.factorisation, self._shares())
 
     def _contents(self) -> NDArray:
         self.problem.contents(self._work[0])
         return self._work[0].FV().NumPy().copy()
 
-    def _backward_euler(self, start: Snapshot, past: Points, end: float) -> Attempt:
+    def _backward_euler(self, start: Snapshot, past: Points, contents: NDArray, end: float) -> Attempt:
         """One step and its local error, by extrapolation from the step before.
 
         With x″ from the extrapolation over the step before, x_new − x_guess = Δt (2Δt + Δt_old)/2 x″ while the
         error is Δt²/2 x″. Without a step before, the guess is the old state (x′ = 0 before a kink).
         """
         problem, dt = self.problem, end - start.time
-        contents = self._contents() if self.with_slopes else None
         guess = polynomial_at(past[-2:], end) if past else None
-        problem.begin_step(end, dt, guess)
+        problem.begin_step(end, dt, guess, old_contents=contents)
         outcome = self._solve(dt)
         if outcome.failure and guess is not None:  # the extrapolation may be what is inadmissible
-            problem.restore(start)  # the old contents are those of the old charge
-            problem.begin_step(end, dt)
+            problem.restore(start)
+            problem.begin_step(end, dt, old_contents=contents)
             outcome = self._solve(dt)
+        if outcome.failure and self._from_above:
+            outcome = self._solve_from_above(dt, start.values)
         if outcome.failure:
             return Attempt(outcome.iterations, outcome.failure)
-        slope = None if contents is None else (contents - self._contents()) / dt
+        slope = (contents - self._contents()) / dt if self.with_slopes or problem.storage.is_lumped else None
         before = past[-1][0] - past[-2][0] if guess is not None else 0.0
         difference = problem.vector - (start.values if guess is None else guess)
         stages = (Stage(dt, end, problem.vector.copy()),)
         return Attempt(outcome.iterations, None, stages, difference, dt / (2 * dt + before), slope)
 
-    def _runge_kutta(self, scheme: Scheme, start: Snapshot, past: Points, slope: NDArray, end: float) -> Attempt:
+    def _runge_kutta(
+        self, scheme: Scheme, start: Snapshot, past: Points, contents: NDArray, slope: NDArray, end: float
+    ) -> Attempt:
         """The stages of one step, and its error by the embedded solution.
 
         Stage i solves S(x_i) + γ Δt R(x_i) = S(x_old) − Δt Σ_{j<i} a_ij R_j; R_j is what that stage's contents tell.
         The estimate, a defect of contents, becomes one of the fields by the stages' matrix, which damps what is stiff.
         """
         problem, (time, old) = self.problem, (start.time, start.values)
-        dt, contents = end - time, self._contents()
+        dt = end - time
         slopes: list[NDArray] = [slope]
         stages = [Stage(scheme.weights[0] * dt, time, old)]
         points = [*past[:-1], (time, old)]
@@ -162,6 +184,8 @@ class Attempts:
         if outcome.failure:
             self.problem.begin_stage(at, inner, right, old)
             outcome = self._solve(inner)
+        if outcome.failure and self._from_above:
+            outcome = self._solve_from_above(inner, old)
         return outcome
 
 

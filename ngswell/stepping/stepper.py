@@ -8,7 +8,7 @@ from math import inf
 import numpy as np
 from numpy.typing import NDArray
 
-from ngswell.errors import Failure, Reason, Rejection
+from ngswell.errors import OF_IONS, UNCONVERGED, Failure, Reason, Rejection
 from ngswell.files import Tree
 from ngswell.problem.problem import Problem
 from ngswell.solve.direct import LinearSolver
@@ -29,7 +29,10 @@ STUCK = 0.25
 the step, is taken with backward Euler: where contents vanish or rates jump."""
 
 CAREFUL = 10
-"""So many steps after such a one are taken with backward Euler too."""
+"""So many steps after such a one are taken with backward Euler too; or with salt that is lumped, where integrals fail."""
+
+BEFORE_LUMPING = 2
+"""So many steps of backward Euler have to fail before salt is lumped for the first time in a run."""
 
 INSTANT = 1e-9
 """Share of the time to the next kink in which nothing happens but what loads and baths change at once."""
@@ -75,7 +78,8 @@ class Stepper:
         self._watches = not control.accepts(inf)  # whether errors count
         self._points: list[tuple[float, NDArray]] = []  # times and states of the last step, unless a kink lies between
         self._wanted: float | None = None
-        self._careful = 0
+        self._careful = self._lumping = 0
+        self._lumped = self._lumping_helps = False  # whether the last accepted step was lumped, or any was
         of_run = self._sizes if self._watches and self.newton == control.newton else None
         self._attempts = Attempts(problem, self.newton, self.factorisation, self._scheme.explicit_start, of_run)
         self._slope = self._attempts.first_slope()
@@ -92,7 +96,8 @@ class Stepper:
             "points": {str(number): values for number, (_, values) in enumerate(self._points)},
             "times": np.array([at for at, _ in self._points]),
             "sizes": self._sizes.state(),
-            "careful": np.array(self._careful),
+            "careful": np.array([self._careful, self._lumping]),
+            "lumped": np.array([self._lumped, self._lumping_helps]),
             "slope": self._slope,
             "factorisation": self.factorisation.state(),
         }
@@ -110,10 +115,13 @@ class Stepper:
         if same:
             self._points = [(at, state["points"][str(number)]) for number, at in enumerate(state["times"].tolist())]
             self._wanted = float(state["wanted"]) if "wanted" in state else None
-            self._careful, self._slope = int(state["careful"]), state["slope"]
+            self._careful, self._lumping = state["careful"].tolist()
+            self._lumped, self._lumping_helps = state["lumped"].tolist()
+            self._slope = state["slope"]
             present = self.problem.snapshot(self.problem.time)
             self.factorisation.restore(self.problem, state["factorisation"])  # moves the fields and the clock
             self.problem.restore(present)
+            self.problem.storage.lump(self._lumped)
         self._keep(self.problem.time)
 
     # -- one step ------------------------------------------------------------------------------------------------------
@@ -134,26 +142,44 @@ class Stepper:
         rejected: list[Rejection] = []
         last: Rejection | None = None  # the attempt before, if its error was too large
         scheme = BACKWARD_EULER if self._careful else self._scheme
+        lumped = self._lumping > 0
+        integrals: list[Failure] = []  # failures of backward Euler with them
         while True:
             dt = landing(self._wanted, stop - time)
             if same_time(time + dt, stop):  # what would be left is round-off
                 dt = stop - time
             end = stop if dt == stop - time else time + dt
-            attempt = self._attempts.take(scheme, self.accepted, self._points, self._slope, end)
+            attempt = self._attempts.take(scheme, self.accepted, self._points, self._slope, end, lumped)
             error = safety * self._error(attempt)
             if attempt.failure is None and self._accepts(error, scheme, last):
                 return self._accept(attempt, error, scheme, dt, tuple(rejected))
             rejection, failure = self._reject(attempt, error, dt)
-            last, stuck = self._retry(rejection, scheme, dt, last, bool(rejected))
             rejected.append(rejection)
+            self.problem.restore(self.accepted)
+            self.problem.storage.lump(self._lumped)
+            if attempt.failure:
+                if not lumped and not scheme.embedded:
+                    integrals.append(failure)
+                lumped = not lumped and self._may_lump(failure, len(integrals), end)
+                if lumped:
+                    continue
+            last, stuck = self._retry(rejection, scheme, dt, last, len(rejected) > 1)
             if stuck and shortest and scheme.embedded:
                 if len(rejected) >= PATIENCE:
                     last, self._wanted, shortest = None, shortest, 0.0
             elif len(rejected) > 1 and scheme.embedded and stuck:
                 scheme, last, self._wanted, self._careful = BACKWARD_EULER, None, rejected[0].dt, CAREFUL
-            self.problem.restore(self.accepted)
             if self._wanted < resolution(kink - time, time):
-                raise Failed(time, dt, rejected[0].dt, failure)
+                raise Failed(time, dt, rejected[0].dt, integrals[-1] if integrals else failure)
+
+    def _may_lump(self, failure: Failure, times: int, end: float) -> bool:
+        """Whether the step to `end` [s] is tried with lumped salt, after backward Euler has failed so many `times`.
+
+        Where ions run out, or nothing is known yet; but not while the charge changes, which uses them up wherever they are.
+        """
+        charge = self.problem.setup.charge
+        may_be_ions = failure.reason in OF_IONS | UNCONVERGED and charge.at(end) == charge.at(self.accepted.time)
+        return may_be_ions and self.problem.lumps and (times >= BEFORE_LUMPING or self._lumping_helps)
 
     def _settle(self, interval: float) -> Step | None:
         """A first step that takes what loads and baths change at once, unless that is nothing or not found."""
@@ -203,6 +229,9 @@ class Stepper:
         if attempt.slope is not None:
             self._slope = attempt.slope
         self._careful = max(0, self._careful - 1)
+        self._lumped = self.problem.storage.is_lumped
+        self._lumping = (self._lumping or CAREFUL) - 1 if self._lumped else 0
+        self._lumping_helps |= self._lumped
         self._points = [(stage.time, stage.values) for stage in attempt.stages]
         if not scheme.explicit_start:
             self._points.insert(0, (time, old))

@@ -575,10 +575,10 @@ def test_when_it_is_written(tmp_path):
 
 
 def test_a_run_that_fails_leaves_its_last_accepted_state(tmp_path):
-    crushing = Ramp((0, 0.15), (10, 0.15), (10.01, 2.0))
+    outrunning = Ramp((0, 1.0), (10, 1.0), (12, 20.0))  # the charge uses up all ions
 
     def run(steps=None, **more):
-        scene = confined_column(None, c=crushing, model=Potential(), cells=8)
+        scene = confined_column(None, c=0.15, charge=outrunning, model=Potential(), cells=8)
         return scene.run(40.0, steps or Adaptive(0.1), **more)
 
     checkpoint, probe = Checkpoint(tmp_path / "run", every=3600.0), Probe((0.5,), "J")
