@@ -77,6 +77,26 @@ def outrun(problem: Problem, snapshot: Snapshot, dt: float, failure: Failure) ->
     return Failure(Reason.CHARGE_OUTRUNS_SALT, failure.field, failure.where, said)
 
 
+SPENT = 1e-2
+"""Share of the anions of a state of rest below which hardly any are left."""
+
+
+def anions_are_spent(problem: Problem) -> bool:
+    """Whether somewhere hardly any anions are left of those at rest with the highest charge and the lowest bath."""
+    outputs = problem.state.outputs()
+    if "c_minus" not in outputs or not problem.setup.baths:
+        return False
+    return bool(outputs["c_minus"](problem.points).min() < SPENT * _anions_at_rest(problem)[1])
+
+
+def _anions_at_rest(problem: Problem) -> tuple[float, float]:
+    """The highest charge, and the anions beside it at rest in the lowest bath [mol/l]."""
+    setup, material = problem.setup, problem.setup.material
+    cfc = max(map(abs, setup.charge.values)) * float(CF(material.cfc0)(problem.points).max())
+    salt = min(value for bath in setup.baths if bath.salt is not None for value in bath.salt.values)
+    return cfc, float(donnan.anions(salt, cfc, material.Gamma))
+
+
 def salt_time(problem: Problem) -> float:
     """T of `outrun` [s]."""
     setup, places = problem.setup, vertices(problem.mesh)
@@ -84,9 +104,7 @@ def salt_time(problem: Problem) -> float:
     far = max(min(float(np.linalg.norm(places[numbers] - place, axis=1).min()) for numbers in wet) for place in places)
     material = setup.material
     D = CF(2 * material.D_plus * material.D_minus / (material.D_plus + material.D_minus))(problem.points).min()
-    cfc = max(map(abs, setup.charge.values)) * float(CF(material.cfc0)(problem.points).max())
-    salt = min(value for bath in setup.baths if bath.salt is not None for value in bath.salt.values)
-    anions = donnan.anions(salt, cfc, material.Gamma)
+    cfc, anions = _anions_at_rest(problem)
     return cfc / (2 * anions) * far**2 / float(D)
 
 

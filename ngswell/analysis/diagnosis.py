@@ -9,7 +9,7 @@ import numpy as np
 from netgen.meshing import NgException
 from numpy.typing import NDArray
 
-from ngswell.analysis.causes import imbalance, oscillating, outrun
+from ngswell.analysis.causes import anions_are_spent, imbalance, oscillating, outrun
 from ngswell.analysis.perturbations import Perturbations
 from ngswell.errors import OF_IONS, UNCONVERGED, Failure, NgswellError, Reason, place
 from ngswell.mesh.points import vertices
@@ -60,8 +60,10 @@ def explain(
     # Without fluid, the ions of a cell are undetermined too: that does not explain why fluid runs out.
     if found is not None and (failure.reason in UNCONVERGED or found.kind is not Undetermined.Kind.LOCAL):
         return found.failure
-    if failure.reason in OF_IONS:
-        return outrun(problem, snapshot, dt, failure)
+    if failure.reason in OF_IONS or (failure.reason in UNCONVERGED and anions_are_spent(problem)):
+        charge = outrun(problem, snapshot, dt, failure)
+        if charge is not None or failure.reason in OF_IONS:
+            return charge
     out_of_balance = imbalance(problem) if first else None  # what is not at rest has no stability
     if out_of_balance is not None:
         return out_of_balance

@@ -28,11 +28,13 @@ from ngswell import (
     Ramp,
     Roller,
     Scene,
+    Spatial,
     Stability,
     StepError,
     Symmetry,
     Traction,
     Uncharged,
+    box,
     column,
     rectangle,
 )
@@ -123,9 +125,17 @@ def disc(model, **changes):
     )
 
 
+def block(model, **changes):
+    """An eighth of a cuboid."""
+    supports = [Symmetry("left"), Symmetry("front"), Symmetry("bottom")]
+    baths = [Bath("top|right|back", c=0.15)]
+    fields = {"mesh": box(1.0, 1.0, 0.5, 2, 1, 1), "kinematics": Spatial(), "supports": supports, "baths": baths}
+    return body(**fields | {"model": model} | changes)
+
+
 @case(Reason.CHARGE_OUTRUNS_SALT)
 @pytest.mark.parametrize("model", [Potential(), Concentration()], ids=str)
-@pytest.mark.parametrize(("make", "too_fast"), [(body, 10.0), (disc, 1000.0)])
+@pytest.mark.parametrize(("make", "too_fast"), [(body, 10.0), (disc, 1000.0), (block, 10.0)])
 def test_a_charge_that_rises_too_fast_is_told_of_its_ramp(make, too_fast, model):
     def raised(within):
         scene = make(model=model, charge=Ramp((0, 0), (within, 1)))
