@@ -50,6 +50,7 @@ from ngswell.observers.vtk import VTK
 from ngswell.physics.kinematics import Axisymmetric, Confined, PlaneStrain, Spatial
 from ngswell.physics.material import TABLE_1, TABLE_2, Material
 from ngswell.physics.pores import HolmesMow, MackieMeares, PowerLaw
+from ngswell.physics.regions import by_region
 from ngswell.physics.solid import NeoHookean
 from ngswell.problem.problem import Problem
 from ngswell.run.checkpoint import Checkpoint
@@ -77,8 +78,8 @@ __all__ = [
     "OverlapWarning", "Penalty", "Pin", "PlaneStrain", "Potential", "PowerLaw", "Prescribed", "Probe", "Problem",
     "Progress", "Ramp", "Reason", "Restart", "Result", "Role", "Roller", "Scene", "Setup", "Sine", "Snapshot",
     "Snapshots", "Spatial", "Spline", "Stability", "StepError", "Support", "Symmetry", "Term", "Traction",
-    "TwoLevelSolver", "Uncharged", "Weak", "Weight", "box", "check_mesh", "column", "from_occ", "read_checkpoint",
-    "read_mesh", "rectangle",
+    "TwoLevelSolver", "Uncharged", "Weak", "Weight", "box", "by_region", "check_mesh", "column", "from_occ",
+    "read_checkpoint", "read_mesh", "rectangle",
 ]  # fmt: skip
 
 for _name in __all__:

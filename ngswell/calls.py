@@ -42,6 +42,7 @@ def refusing(thing: Thing) -> Thing:
 
 def _refusing(function: Callable, what: str, signature: inspect.Signature) -> Callable:
     takes = [name for name in signature.parameters if name != "self"]
+    any_name = any(parameter.kind is inspect.Parameter.VAR_KEYWORD for parameter in signature.parameters.values())
     by_name = all(signature.parameters[name].kind is inspect.Parameter.KEYWORD_ONLY for name in takes)
 
     @wraps(function)
@@ -52,7 +53,7 @@ def _refusing(function: Callable, what: str, signature: inspect.Signature) -> Ca
             try:
                 signature.bind(*arguments, **named)
             except TypeError as misfit:
-                fault = next((_unknown(name, takes) for name in named if name not in takes), str(misfit))
+                fault = next((_unknown(name, takes) for name in named if not any_name and name not in takes), str(misfit))
                 raise InputError(f"{what}: {fault}; it takes {'by name: ' if by_name else ''}{', '.join(takes)}") from None
             raise
 

@@ -6,10 +6,11 @@ from functools import cached_property
 from itertools import chain, combinations
 
 import numpy as np
-from ngsolve import EDGE, FACE, VERTEX, VOL, Mesh, NodeId
+from ngsolve import EDGE, FACE, VERTEX, VOL, CoefficientFunction, Mesh, NodeId
 from numpy.typing import NDArray
 
 from ngswell.errors import InputError, place
+from ngswell.mesh.points import points
 
 
 class Sides:
@@ -44,6 +45,19 @@ class Sides:
         order: all four triangles of three of them, which cover the side twice."""
         pieces = [(side, piece) for side, these in enumerate(self.corners) for piece in combinations(these, self.mesh.dim)]
         return np.array([side for side, _ in pieces]), np.array([piece for _, piece in pieces])
+
+    def jumps(self, field: CoefficientFunction, share: float) -> bool:
+        """Whether values of a field in two neighbouring cells are further apart than all of those inside both, by more than
+        that share of its largest value: no smooth field that the cells resolve does so."""
+        where = points(self.mesh)
+        values, cell = field(where).ravel(), where["nr"]
+        low, high = np.full(self.cells, np.inf), np.full(self.cells, -np.inf)
+        np.minimum.at(low, cell, values)
+        np.maximum.at(high, cell, values)
+        one, other = self.neighbours.T
+        apart = np.maximum(low[one] - high[other], low[other] - high[one])
+        inside = (high - low)[one] + (high - low)[other]
+        return bool((apart > inside + share * np.abs(values).max()).any())
 
     @cached_property
     def parts(self) -> list[NDArray]:

@@ -1,9 +1,9 @@
-"""Meshes with named boundaries: structured and graded, from CAD shapes."""
+"""Meshes with named boundaries and regions: structured and graded, from CAD shapes."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from math import log, prod
+from math import prod
 from typing import Any
 
 import numpy as np
@@ -15,9 +15,7 @@ from numpy.typing import NDArray
 from ngswell import checks
 from ngswell.errors import InputError
 from ngswell.mesh.soundness import check_mesh
-
-Grade = dict[str, float]
-"""Boundary name → how many times thinner the cell at that boundary is than the largest of its row [-]."""
+from ngswell.mesh.spacing import Grade, Lines, Regions, coordinates, places, with_regions
 
 SIZES = (1e-6, 1e6)
 """Sizes that a body may have [mm]."""
@@ -26,18 +24,29 @@ MOST_CELLS = 10**7
 """Cells that a mesh may have."""
 
 
-def column(height: float, cells: int, grade: Grade | None = None) -> Mesh:
+def column(
+    height: float,
+    cells: int,
+    grade: Grade | None = None,
+    lines: Lines | None = None,
+    regions: Regions | None = None,
+) -> Mesh:
     """A segment of `height` [mm] with boundaries "bottom" (x = 0) and "top".
 
     `grade={"top": 10}` thins the cells in a geometric progression: the one at the top has a tenth of the length of the
     largest, at the bottom. Towards both ends, the largest is in the middle.
+
+    `lines={"x": 0.3}` or `{"x": [0.3, 0.8]}` shifts the cells so that mesh lines lie there [mm]: where baths or materials
+    bend or jump within a cell, no order helps. `regions={"x": ["core", "skin"]}` names what lies between them, from x = 0
+    upwards, for `by_region`.
     """
     (height,), (cells,) = _checked_sizes("column", (height,), (cells,))
-    (nodes,) = _graded("column", (height,), (cells,), (("bottom", "top"),), grade)
+    at = places("column", lines, "x")
+    (nodes,) = coordinates("column", (height,), (cells,), (("bottom", "top"),), grade, at)
     mesh = Make1DMesh(cells, mapping=lambda s: nodes[round(cells * s)])
     for number, name in enumerate(("bottom", "top")):
         mesh.ngmesh.SetBCName(number, name)
-    return mesh
+    return with_regions("column", mesh, at, regions)
 
 
 def rectangle(
@@ -47,29 +56,24 @@ def rectangle(
     ny: int,
     triangles: bool = False,
     grade: Grade | None = None,
-    lines: dict[str, float] | None = None,
+    lines: Lines | None = None,
+    regions: Regions | None = None,
 ) -> Mesh:
     """Cells on [0, width] × [0, height] [mm] with boundaries "bottom", "right", "top", "left".
 
     Quadrilaterals, or `triangles`, two in each. `grade` thins the cells towards boundaries, as in `column`.
-    `lines={"x": 0.3}` shifts the cells so that a mesh line lies at x = 0.3 mm: where baths or materials bend within a
-    cell, no order helps.
+    `lines={"x": 0.3, "y": [0.5, 0.8]}` puts mesh lines there and `regions={"y": ["core", "middle", "skin"]}` names what lies
+    between those of one axis, as in `column`.
     """
     (width, height), (nx, ny) = _checked_sizes("rectangle", (width, height), (nx, ny))
     checks.flag("rectangle: triangles", triangles)
-    xs, ys = _graded("rectangle", (width, height), (nx, ny), (("left", "right"), ("bottom", "top")), grade)
-    for axis, line in _by_name("rectangle: lines", lines, {"x": 0.3}):
-        checks.choice("rectangle: lines: axis", axis, ("x", "y"))
-        nodes = xs if axis == "x" else ys
-        if not (checks.is_number(line) and 0 < line < nodes[-1] and len(nodes) >= 3):
-            raise InputError(
-                f"rectangle: lines = {{{axis!r}: {checks.short(line)}}} mm needs two cells or more in {axis} and a place "
-                f"between 0 and {nodes[-1]:g}"
-            )
-        nodes[:] = _shifted(nodes, line)
-    return MakeStructured2DMesh(
+    sides = (("left", "right"), ("bottom", "top"))
+    at = places("rectangle", lines, "xy")
+    xs, ys = coordinates("rectangle", (width, height), (nx, ny), sides, grade, at)
+    mesh = MakeStructured2DMesh(
         quads=not triangles, nx=nx, ny=ny, mapping=lambda s, t: (xs[round(nx * s)], ys[round(ny * t)])
     )
+    return with_regions("rectangle", mesh, at, regions)
 
 
 def box(
@@ -81,16 +85,20 @@ def box(
     nz: int,
     cells: str = "hexahedra",
     grade: Grade | None = None,
+    lines: Lines | None = None,
+    regions: Regions | None = None,
 ) -> Mesh:
     """Cells on [0, width] × [0, depth] × [0, height] [mm].
 
     Boundaries: "left" (x = 0) and "right", "front" (y = 0) and "back", "bottom" (z = 0) and "top". `cells` are "hexahedra",
-    or two "prisms" (triangles in x and y, extruded in z) or six "tetrahedra" in each. `grade` as in `column`.
+    or two "prisms" (triangles in x and y, extruded in z) or six "tetrahedra" in each. `grade`, `lines` and `regions` as in
+    `rectangle`.
     """
     checks.choice("box: cells", cells, ("hexahedra", "prisms", "tetrahedra"))
     (width, depth, height), (nx, ny, nz) = _checked_sizes("box", (width, depth, height), (nx, ny, nz))
     sides = (("left", "right"), ("front", "back"), ("bottom", "top"))
-    xs, ys, zs = _graded("box", (width, depth, height), (nx, ny, nz), sides, grade)
+    at = places("box", lines, "xyz")
+    xs, ys, zs = coordinates("box", (width, depth, height), (nx, ny, nz), sides, grade, at)
     mesh = MakeStructured3DMesh(
         hexes=cells == "hexahedra",
         prism=cells == "prisms",
@@ -102,7 +110,7 @@ def box(
     # NGSolve looks along x and counts the sides x = 0, y = 0, x = width, y = depth, z = 0, z = height.
     for number, name in enumerate(("left", "front", "right", "back", "bottom", "top")):
         mesh.ngmesh.SetBCName(number, name)
-    return mesh
+    return with_regions("box", mesh, at, regions)
 
 
 def from_occ(shape: Any, maxh: float, order: int = 1, quads: bool = False) -> Mesh:
@@ -157,45 +165,3 @@ def _checked_sizes(what: str, sizes: tuple[float, ...], cells: tuple[int, ...]) 
     if prod(numbers) > MOST_CELLS:
         raise InputError(f"{what}: {' × '.join(map(str, numbers))} cells are more than {MOST_CELLS}; take fewer")
     return lengths, numbers
-
-
-def _by_name(what: str, values: Any, example: dict[str, float]) -> list[tuple[Any, Any]]:
-    """The entries of a dictionary, none for None."""
-    if values is None:
-        return []
-    if not isinstance(values, dict):
-        raise InputError(f"{what} has to be a dictionary, such as {example}, got {checks.short(values)}")
-    return list(values.items())
-
-
-def _graded(
-    what: str, sizes: tuple[float, ...], cells: tuple[int, ...], sides: tuple[tuple[str, str], ...], grade: Grade | None
-) -> list[list[float]]:
-    """Node coordinates [mm] along each axis, whose two ends are named in `sides`."""
-    names = [name for pair in sides for name in pair]
-    ratios = dict.fromkeys(names, 1.0)
-    for name, ratio in _by_name(f"{what}: grade", grade, {names[-1]: 10.0}):
-        checks.choice(f"{what}: grade: boundary", name, names)
-        ratios[name] = checks.number(
-            f"{what}: grade at {name!r}", ratio, low=1.0, high=1e6, hint="it is largest over smallest cell"
-        )
-    return [
-        _nodes(size, number, ratios[low], ratios[high])
-        for size, number, (low, high) in zip(sizes, cells, sides, strict=True)
-    ]
-
-
-def _shifted(nodes: list[float], place: float) -> list[float]:
-    """Nodes with the one nearest to `place` moved there, stretched evenly on either side of it."""
-    number = 1 + int(np.argmin(np.abs(np.array(nodes[1:-1]) - place)))
-    return np.interp(nodes, [0.0, nodes[number], nodes[-1]], [0.0, place, nodes[-1]]).tolist()
-
-
-def _nodes(length: float, cells: int, low: float, high: float) -> list[float]:
-    """Nodes of `cells` cells on [0, length], thinned `low` and `high` times at the ends, in geometric progressions."""
-    index = np.arange(cells)
-    both = low > 1 and high > 1
-    reach = max(1, (cells - 1) // 2 if both else cells - 1)  # cells from an end to the largest
-    thinning = log(low) * np.maximum(0, 1 - index / reach) + log(high) * np.maximum(0, 1 - (cells - 1 - index) / reach)
-    nodes = np.concatenate([[0.0], np.cumsum(np.exp(-thinning))])
-    return [*(length * nodes[:-1] / nodes[-1]), length]

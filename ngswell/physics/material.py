@@ -106,6 +106,12 @@ class Material:
         for field in fields(self):
             value = getattr(self, field.name)
             if isinstance(value, CoefficientFunction):
+                regions = getattr(value, "regions", mesh.GetMaterials())
+                if regions != mesh.GetMaterials():
+                    raise InputError(
+                        f"{field.name} is by_region of another mesh, with the regions {', '.join(map(repr, regions))}; the "
+                        f"scene's has {', '.join(map(repr, mesh.GetMaterials()))}: make it with the scene's mesh"
+                    )
                 samples = value(where).ravel()
                 within(field.name, float(samples.min()))
                 within(field.name, float(samples.max()))

@@ -29,6 +29,9 @@ from ngswell.setup.rigid_motions import check_determined
 from ngswell.setup.snapshot import Snapshot
 from ngswell.setup.supports import Support
 
+SMALL_JUMP = 0.1
+"""Jump of cfc0, as a share of its largest value, below which `Concentration` is off by less than 1e-4."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Setup:
@@ -67,6 +70,7 @@ class Setup:
         check_sides(self.sides)
         self.material.check_on(self.mesh)
         self.model.check(self.material, self.baths)
+        self._check_jumps()
         for value in self.charge.values:
             if not 0 <= value <= 100:
                 raise InputError(f"charge factor {value!r} is outside 0 … 100; it multiplies cfc0")
@@ -125,6 +129,17 @@ class Setup:
             if re.escape(name) != name:
                 raise InputError(f"{what}: boundary {name!r} has characters that NGSolve reads as a pattern; rename it")
         return names
+
+    def _check_jumps(self) -> None:
+        """Refuse a charge that jumps where the model has a continuous field for it: no mesh brings it to the right rest."""
+        charge = self.material.cfc0
+        if self.model.charge_field is None or not isinstance(charge, CoefficientFunction):
+            return
+        if self.sides.jumps(charge, SMALL_JUMP):
+            raise InputError(
+                f"cfc0 jumps from cell to cell, but {type(self.model).__name__} has one continuous field for the charge and "
+                "comes to rest elsewhere on every mesh, by percents: take Potential() or LocalDonnan(), which are exact"
+            )
 
     def _check_baths(self) -> None:
         taken: set[str] = set()

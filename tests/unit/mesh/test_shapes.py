@@ -5,7 +5,7 @@ from math import pi
 import numpy as np
 import pytest
 from netgen.occ import Axes, Box, Glue, WorkPlane, Z
-from ngsolve import CF, ET, VOL, Integrate, specialcf
+from ngsolve import CF, ET, VOL, Integrate, specialcf, x
 
 from ngswell import InputError, box, column, from_occ, rectangle
 from tests.meshes import MESHES, OUTWARD, SIDES_2D, SIDES_3D, quarter_disc
@@ -89,6 +89,37 @@ def test_lines_lie_where_asked(nx, ny):
     assert (xs[0], xs[-1], ys[0], ys[-1]) == (0.0, 1.1, 0.0, 1.0)
 
 
+@pytest.mark.parametrize("cells", [4, 9, 20])
+@pytest.mark.parametrize("grade", [None, {"top": 30.0}])
+def test_several_lines_lie_where_asked(cells, grade):
+    for at in ([0.05, 0.1, 0.9], [0.8, 0.81, 0.82], [0.9, 0.1, 0.5]):  # crowded, too, and in any order
+        nodes = sorted(vertex.point[0] for vertex in column(1.0, cells, grade, {"x": at}).vertices)
+        assert len(nodes) == cells + 1
+        assert set(at) <= set(nodes)
+        assert (np.diff(nodes) > 0).all()
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda **more: column(1.0, 6, **more),
+        lambda **more: rectangle(1.0, 1.0, 6, 2, **more),
+        lambda **more: rectangle(1.0, 1.0, 6, 2, triangles=True, **more),
+        lambda **more: box(1.0, 1.0, 1.0, 6, 1, 2, **more),
+        lambda **more: box(1.0, 1.0, 1.0, 6, 1, 2, "prisms", **more),
+        lambda **more: box(1.0, 1.0, 1.0, 6, 1, 2, "tetrahedra", **more),
+    ],
+)
+def test_regions_lie_between_lines(make):
+    mesh = make(lines={"x": [0.9, 0.15]}, regions={"x": iter(["skin", "core", "skin"])})
+    assert sorted(mesh.GetMaterials()) == ["core", "skin"]
+    assert set(mesh.GetBoundaries()) == set(make().GetBoundaries())
+    core = mesh.MaterialCF({"core": 1.0}, default=0.0)
+    # Polynomials on straight cells: exact to round-off.
+    assert Integrate(core, mesh) == pytest.approx(0.75, rel=1e-12)
+    assert Integrate(core * x, mesh) == pytest.approx((0.9**2 - 0.15**2) / 2, rel=1e-12)
+
+
 def test_ungraded_is_uniform():
     assert lengths(column(3.0, 5)) == pytest.approx(0.6, rel=1e-12)
     assert lengths(column(3.0, 1, grade={"top": 10.0})) == pytest.approx(3.0)
@@ -107,6 +138,14 @@ def test_ungraded_is_uniform():
         (lambda: rectangle(1.0, 1.0, 3, 3, lines={"z": 0.5}), "'z' is none of 'x', 'y'"),
         (lambda: rectangle(1.0, 1.0, 3, 3, lines={"x": 1.5}), "1.5.*between 0 and 1"),
         (lambda: rectangle(1.0, 1.0, 1, 3, lines={"x": 0.5}), "two cells"),
+        (lambda: column(1.0, 3, lines={"x": [0.5, 0.5]}), "different places"),
+        (lambda: column(1.0, 3, lines={"x": [0.2, 0.5, 0.7]}), "one more than lines"),
+        (lambda: column(1.0, 3, lines={"y": 0.5}), "'y' is none of 'x'"),
+        (lambda: column(1.0, 3, lines={"x": 0.5}, regions={"x": ["a"]}), "a list of 2 names in x"),
+        (lambda: column(1.0, 3, regions={"x": "a"}), "a list of 1 names in x"),
+        (lambda: column(1.0, 3, lines={"x": 0.5}, regions={"x": ["a", 2]}), "a name .* got 2"),
+        (lambda: rectangle(1.0, 1.0, 3, 3, regions={"x": ["a"], "y": ["b"]}), "along one axis"),
+        (lambda: rectangle(1.0, 1.0, 3, 3, regions={"z": ["a"]}), "'z' is none of 'x', 'y'"),
         (lambda: rectangle(1.0, 1.0, 3, 3, grade={"top": float("nan")}), "grade at 'top' = nan"),
         (lambda: from_occ(WorkPlane().Circle(1.0).Face(), 0.5), "no boundary has a name.*edges"),
         (lambda: from_occ(Box((0, 0, 0), (1, 1, 1)), 0.5), "no boundary has a name.*faces"),
@@ -152,7 +191,7 @@ def test_two_materials_of_one_shape():
         (lambda: column(1e-300, 3), "1e-300 mm is outside"),
         (lambda: column(1.0, 10**9), "cells 1000000000"),
         (lambda: column(1.0, 3, grade=["top"]), "grade has to be a dictionary"),
-        (lambda: rectangle(1.0, 1.0, 3, 3, lines={"x": "a"}), "'x': 'a'"),
+        (lambda: rectangle(1.0, 1.0, 3, 3, lines={"x": "a"}), "line in x .* got 'a'"),
         (lambda: rectangle(1.0, 1.0, 1, 1, triangles="no"), "True or False, got 'no'"),
     ],
 )
