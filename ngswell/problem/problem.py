@@ -190,9 +190,8 @@ class Problem(Discretisation):
         self.set_time(time, charge_share)
         self._prescribed.update()
         if guess is not None:
-            held = self.vector[self._held]
             self.vector[:] = guess
-            self.vector[self._held] = held  # no correction sees it, and extrapolation would let round-off grow
+            self.vector[self._held] = 0.0  # no correction sees it, and extrapolation would let round-off grow
 
     def keep_positive(self, start: NDArray) -> None:
         """Where a vertex has lost all of an unknown that is positive, a part of its value at `start`, or of round-off's.

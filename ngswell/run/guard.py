@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from statistics import median
-
 from ngswell import checks
 from ngswell.analysis.perturbations import Instability, Perturbations
 from ngswell.calls import warn
@@ -11,9 +9,7 @@ from ngswell.errors import InstabilityError, InstabilityWarning, NgswellError
 from ngswell.observers.stability import FOLLOWED
 from ngswell.problem.problem import Problem
 from ngswell.run.watch import Watch
-from ngswell.setup.snapshot import Snapshot
 from ngswell.solve.direct import LinearSolver
-from ngswell.stepping.steps import Step
 
 ANSWERS = ("warn", "error", "off")
 """What a state past the limit of stability is answered with."""
@@ -23,10 +19,8 @@ WORK = 400
 
 MATRIX = 4
 
-HARD = 5
-"""A step with so many times the usual iterations may have left a state that had lost its stability for another: a body that
-buckles or wrinkles within one step. A look at the state before costs less than the iterations that were too many.
-Steps after kinks take up to four times the usual ones."""
+AT_KINK = 100
+"""The same at kinks, where what loads and baths do is at an extreme; the first kink is looked at in any case."""
 
 
 class Guard:
@@ -43,8 +37,7 @@ class Guard:
         self._problem, self._solver, self._slowest = problem, solver, 1 / duration
         self._perturbations: Perturbations | None = None
         self._looked = self._work()
-        self._before: Snapshot | None = None  # what the next step starts from
-        self._iterations: list[int] = []
+        self._kinks = False  # whether it has looked at one
 
     @staticmethod
     def check(what: str, answer: str) -> None:
@@ -54,25 +47,20 @@ class Guard:
     def _work(self) -> int:
         return self._solver.solves + MATRIX * self._solver.factorisations
 
-    def after_step(self, step: Step, accepted: Snapshot) -> None:
-        """Now and then during a run, and where a step was hard: whether growth is lost, faster than stages follow."""
-        if self._answer == "off" or not self._solver.direct:
+    def after_step(self, time: float, at_kink: bool) -> None:
+        """Now and then, and at kinks: whether perturbations grow, faster than the stages just taken follow.
+
+        The matrix that the last step was solved with tells: K(σ) at σ of one over a stage.
+        """
+        due = self._looked + (AT_KINK if at_kink else WORK)
+        if self._answer == "off" or not self._solver.direct or not (self._work() >= due or (at_kink and not self._kinks)):
             return
-        hard = len(self._iterations) > 2 and step.iterations > HARD * median(self._iterations)
-        self._iterations = [*self._iterations[-20:], step.iterations]
-        stage = self._problem.dt.Get()
-        if hard and self._before is not None:
-            self._problem.restore(self._before)
-            self._look(self._before.time, stage)
-            self._problem.restore(accepted)
-        elif self._work() >= self._looked + WORK:
-            solves = self._solver.solves  # the run's own
-            doubtful = self._doubtful(None)  # K(σ) of the matrix that the last step was solved with, σ of one over a stage
-            self._solver.solves = solves
-            if doubtful:
-                self._look(accepted.time, stage)
-            self._looked = self._work()
-        self._before = accepted
+        self._looked, self._kinks = self._work(), self._kinks or at_kink
+        solves = self._solver.solves  # the run's own
+        doubtful = self._doubtful(None)
+        self._solver.solves = solves
+        if doubtful:
+            self._look(time, self._problem.dt.Get())
 
     def _look(self, time: float, stage: float) -> None:
         """Tell of growth that stages of size `stage` [s] lose; where it cannot be told, the look at the end does."""

@@ -84,7 +84,7 @@ def _run(
             for step in signals.until_received(stepper):
                 steps.append(step.report())
                 watch.observe(step)
-                guard.after_step(step, stepper.accepted)
+                guard.after_step(step.time, timetable.is_kink(step.time) and step.time < timetable.end)
                 if checkpoint:
                     checkpoint.after(step.time, log.restart)
         except BaseException as error:
@@ -93,7 +93,7 @@ def _run(
                 checkpoint.save(log.restart)
             if isinstance(error, Failed):
                 raise _step_error(error, problem, stepper, start.time) from None
-            if isinstance(error, StepError) and error.end is None:
+            if isinstance(error, StepError):
                 error.end = stepper.accepted
             if not isinstance(error, Stopped):
                 raise

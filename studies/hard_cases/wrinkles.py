@@ -197,10 +197,7 @@ def past_the_limit(quick: bool) -> list[Attempt]:
 def wrinkles(quick: bool) -> list[Attempt]:
     """The family."""
     attempts = past_the_limit(quick)
-    attempts += [  # two that stop
-        judged(SKINNED, 0.0, FOLLOWING, [Stability()]),
-        judged(SKINNED, 1e-2, HIDING, [Stability(follow=True)]),
-    ]
+    attempts.append(judged(SKINNED, 1e-2, HIDING, [Stability(follow=True)]))  # stops
     for model in ("Potential",) if quick else DEFAULTS:
         attempts += refinement(SKINNED, 1e-2, CELLS[: 2 if quick else 3], model)[0]
     if not quick:

@@ -117,12 +117,13 @@ class _Counter(Area):
     iterations, steps = 0, 0
     last: Snapshot
 
-    def record(self, problem: Problem, time: float) -> None:
-        super().record(problem, time)
-        self.last = problem.snapshot(time)
+    def start(self, problem: Problem, begin: float, until: float) -> None:
+        super().start(problem, begin, until)
+        self.last = problem.snapshot(begin)
 
     def observe(self, problem: Problem, step: Step) -> None:
         super().observe(problem, step)
+        self.last = problem.snapshot(step.time)
         self.iterations, self.steps = self.iterations + step.iterations, self.steps + 1
 
 
