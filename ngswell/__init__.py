@@ -1,6 +1,6 @@
 """Swelling of charged hydrated porous media on NGSolve. Units mm, N, s, K, mol/l.
 
-Folders, each importing only from those above it: errors, calls, checks, files, streams, schedules, histories · mesh ·
+Folders, each importing only from those above it: units, errors, calls, checks, files, streams, schedules, histories · mesh ·
 physics · models · baths · setup · problem · solve · stepping · analysis · observers · run · scene. Beside them stand
 closed_forms and plotting.
 """
@@ -67,19 +67,20 @@ from ngswell.solve.two_level import TwoLevelSolver
 from ngswell.stepping.schemes import BACKWARD_EULER, ESDIRK4
 from ngswell.stepping.steps import Adaptive, Fixed
 from ngswell.streams import CSV
+from ngswell.units import MPa, day, hour, kPa, metre, micrometre, year
 from ngswell.version import __version__ as __version__
 
 __all__ = [
     "BACKWARD_EULER", "CSV", "ESDIRK4", "TABLE_1", "TABLE_2", "VTK", "Adaptive", "Area", "Averaged", "Axisymmetric",
     "Bath", "Blend", "Call", "Checkpoint", "Coarseness", "Concentration", "Confined", "DampedNewton", "Essential",
     "ExtrapolationWarning", "Fixed", "Frozen", "HolmesMow", "InnerLayer", "InputError", "InstabilityError",
-    "InstabilityWarning", "Integral", "Lagged", "LeastSquares", "Ledger", "Load", "LocalDonnan", "MackieMeares",
+    "InstabilityWarning", "Integral", "Lagged", "LeastSquares", "Ledger", "Load", "LocalDonnan", "MPa", "MackieMeares",
     "Material", "Multiplier", "NeoHookean", "NgswellError", "Nitsche", "Observer", "Outflow", "OutputError",
     "OverlapWarning", "Penalty", "Pin", "PlaneStrain", "Potential", "PowerLaw", "Prescribed", "Probe", "Problem",
     "Progress", "Ramp", "Reason", "Restart", "Result", "Role", "Roller", "Scene", "Setup", "Sine", "Snapshot",
     "Snapshots", "Spatial", "Spline", "Stability", "StepError", "Support", "Symmetry", "Term", "Traction",
-    "TwoLevelSolver", "Uncharged", "Weak", "Weight", "box", "by_region", "check_mesh", "column", "from_occ",
-    "read_checkpoint", "read_mesh", "rectangle",
+    "TwoLevelSolver", "Uncharged", "Weak", "Weight", "box", "by_region", "check_mesh", "column", "day", "from_occ",
+    "hour", "kPa", "metre", "micrometre", "read_checkpoint", "read_mesh", "rectangle", "year",
 ]  # fmt: skip
 
 for _name in __all__:

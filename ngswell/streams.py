@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from io import FileIO, StringIO
 from pathlib import Path
@@ -44,6 +44,24 @@ class CSV:
 
     def __repr__(self) -> str:
         return f"CSV({str(self.path)!r})"
+
+    def write(self, what: str, columns: Mapping[str, NDArray]) -> None:
+        """A whole table: columns by name, one row an entry, and of vectors and tensors one column a component, "u 1 [mm]"
+        for "u [mm]". `what` names the writer. Raises OutputError for a file that exists or cannot be written."""
+        header, parts = [], []
+        for name, values in columns.items():
+            flat = np.asarray(values, dtype=float).reshape(len(values), -1)
+            stem, _, unit = name.rpartition(" [")
+            header += [name] if values.ndim == 1 else [f"{stem} {number} [{unit}" for number in range(1, flat.shape[1] + 1)]
+            parts.append(flat)
+        stream = Stream(self, what)
+        stream.begin()
+        try:
+            stream.write(header)
+            for row in np.column_stack(parts).tolist():
+                stream.write(list(map(repr, row)))
+        finally:
+            stream.close()
 
     def rows(self) -> Iterator[list[str]]:
         """All whole lines, the header first. Raises InputError for a file that is missing or no text."""

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from array import array
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ngswell.errors import InputError
 from ngswell.files import Tree
 from ngswell.observers.when import When
 from ngswell.problem.problem import Problem
 from ngswell.stepping.steps import Step
+from ngswell.streams import CSV
 
 
 class Observer:
@@ -25,7 +28,8 @@ class Observer:
     3. `state` and `restore`, if it shall go on in a run resumed from a checkpoint as if nothing had been; without them it
        starts anew there;
     4. `settings` for the base class, which with `when` tell observers of a class apart;
-    5. `finish`, if something is left to do at the end.
+    5. `finish`, if something is left to do at the end;
+    6. `table`, if `to_csv` shall write its records.
 
     An observer records one run; a second one refuses it. A function of time [s] and state is an observer too:
     `observers=[lambda time, state: ...]`, see `Call`.
@@ -50,6 +54,23 @@ class Observer:
     def time(self) -> NDArray:
         """Times of the records [s]."""
         return np.array(self._recorded)
+
+    def table(self) -> dict[str, NDArray]:
+        """Its records for `to_csv`, one row a time, by name and unit, "J [-]"; those of vectors have several columns."""
+        return {}
+
+    def to_csv(self, path: str | Path, overwrite: bool = False) -> None:
+        """Write the records as a table: `time [s]`, then a column for each number, with its unit in the header.
+
+        Raises InputError without records, and OutputError for a file that exists (unless `overwrite`) or cannot be written.
+        """
+        what, file = f"{type(self).__name__}.to_csv", CSV(path, overwrite)
+        columns = self.table() if len(self.time) else {}
+        if not columns:
+            raise InputError(
+                f"{what}: there are no records of numbers; Probe, Integral, Outflow and Ledger have some after a run"
+            )
+        file.write(what, {"time [s]": self.time, **columns})
 
     def plan(self, begin: float, until: float) -> list[float]:
         """Settle the times of the records [s]; returns them, for steps to land on."""

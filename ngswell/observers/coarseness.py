@@ -79,6 +79,9 @@ class Coarseness(Observer):
         self._totals = {name: value.tolist() for name, value in state.get("total", {}).items()}
         self._largest, self._at = dict(state.get("largest", {})), dict(state.get("at", {}))
 
+    def table(self) -> dict[str, NDArray]:
+        return {"total [-]": self.total}
+
     def _relative(self) -> dict[str, NDArray]:
         if not self._largest:
             raise InputError("Coarseness: nothing was recorded; pass it to scene.run(..., observers=[...]) first")

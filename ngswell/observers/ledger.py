@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ngswell.files import Tree
 from ngswell.observers.effluxes import Effluxes
-from ngswell.observers.records import Recorder
+from ngswell.observers.records import Recorder, power_of_mm, product
 from ngswell.problem.problem import Problem
 from ngswell.setup.snapshot import Snapshot
 from ngswell.stepping.steps import Step
@@ -36,10 +36,14 @@ class Ledger(Recorder):
         self._balances: tuple[str, ...] = ()
 
     def prepare(self, problem: Problem, begin: float, until: float) -> None:
+        self._power = power_of_mm(problem)
         self._vertices = {name: slice(r.start, r.start + problem.mesh.nv) for name, r in problem.ranges.items()}
         self._effluxes, self._balances = Effluxes(problem), tuple(problem.model.balanced)
         self._left = dict.fromkeys(self._effluxes.nodes, 0.0)
         self._contents = self._effluxes.sums(self._effluxes.contents())
+
+    def unit(self, name: str) -> str:
+        return product("mol/l" if name.startswith("cations") else "-", self._power)
 
     def row(self, problem: Problem) -> Mapping[str, Any]:
         held = self._effluxes.contents()

@@ -14,7 +14,7 @@ from ngswell import checks
 from ngswell.errors import InputError
 from ngswell.mesh.points import vertices_of
 from ngswell.observers.effluxes import Effluxes
-from ngswell.observers.records import Recorder
+from ngswell.observers.records import Recorder, power_of_mm, product
 from ngswell.problem.forms import BONUS_ORDER
 from ngswell.problem.problem import Problem
 from ngswell.stepping.steps import Step
@@ -56,7 +56,7 @@ class Outflow(Recorder):
         super().__init__(when, boundary, *self.points, to=to)
 
     def prepare(self, problem: Problem, begin: float, until: float) -> None:
-        self._effluxes = Effluxes(problem)
+        self._effluxes, self._power = Effluxes(problem), power_of_mm(problem)
         if self.boundary not in self._effluxes.vertices:
             known = ", ".join(map(repr, self._effluxes.vertices)) or "none"
             raise InputError(f"Outflow: {self.boundary!r} is no bath's boundary; those of the baths are {known}")
@@ -71,6 +71,10 @@ class Outflow(Recorder):
         self._rate = (self._contents - contents) / step.dt if step.slope is None else step.slope
         self._contents = contents
         super().observe(problem, step)
+
+    def unit(self, name: str) -> str:
+        balance, _, at = name.partition(" ")
+        return product("mol/l" if balance == "cations" else "-", 1 if at else self._power) + "/s"
 
     def row(self, problem: Problem) -> Mapping[str, Any]:
         lacks = self._rate - self._effluxes.flows()

@@ -13,6 +13,7 @@ from ngswell.observers.base import Observer
 from ngswell.problem.problem import Problem
 from ngswell.stepping.steps import Step
 from ngswell.stepping.tally import Tally
+from ngswell.units import readable
 
 
 class Progress(Observer):
@@ -54,8 +55,9 @@ class Progress(Observer):
         self._bar.close()
         tally = self._tally
         print(
-            f"{self.label}: t = {self._begin:g} to {self._reached:g} s, {tally.steps} steps ({tally.rejected} rejected), "
-            f"{tally.iterations} Newton iterations, {problem.space.ndof} unknowns, {perf_counter() - self._clock:.1f} s"
+            f"{self.label}: t = {self._begin:g} s to {readable(self._reached)}, "
+            f"{tally.steps} steps ({tally.rejected} rejected), {tally.iterations} Newton iterations, "
+            f"{problem.space.ndof} unknowns, {perf_counter() - self._clock:.1f} s"
             + (f"; rejected: {tally.why}" if tally.why else ""),
             file=sys.stderr,
             flush=True,

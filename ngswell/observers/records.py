@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ngswell import checks
 from ngswell.files import Tree
 from ngswell.observers.base import Observer
 from ngswell.problem.problem import Problem
@@ -85,9 +86,20 @@ class Table:
             self._stream.close()
 
 
+def power_of_mm(problem: Problem) -> int:
+    """Of the unit of the body's volume: 1 in 1-d, 2 in the plane, 3 in space and where the weight of the measure is 2πr."""
+    return problem.mesh.dim + (not checks.is_number(problem.kinematics.weight))
+
+
+def product(unit: str, power: int) -> str:
+    """A unit times a power of mm: "N/mm² mm²"; without one, the other alone."""
+    factors = [unit.strip("-"), ("", "mm", "mm²", "mm³")[power]]
+    return " ".join(filter(None, factors)) or "-"
+
+
 class Recorder(Observer):
     """An observer whose records are rows of numbers: in the memory, or in the file `to` (a `CSV`, or its path), from which
-    they are read when asked for. A class gives `row` in place of `record`, `state` and `restore`."""
+    they are read when asked for. A class gives `row` and `unit` in place of `record`, `state`, `restore` and `table`."""
 
     def __init__(
         self, when: float | Sequence[float] | None = None, *settings: object, to: str | Path | CSV | None = None
@@ -99,6 +111,14 @@ class Recorder(Observer):
     @abstractmethod
     def row(self, problem: Problem) -> Mapping[str, Any]:
         """The record of the present fields: numbers, vectors or tensors by name."""
+
+    @abstractmethod
+    def unit(self, name: str) -> str:
+        """Unit of a quantity of the records, once prepared."""
+
+    def table(self) -> dict[str, NDArray]:
+        columns = self._table.columns().items()
+        return {f"{name} [{self.unit(name)}]": values for name, values in columns if values[0].size}
 
     @property
     def time(self) -> NDArray:

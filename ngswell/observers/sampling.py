@@ -14,12 +14,15 @@ from ngswell import checks
 from ngswell.errors import InputError
 from ngswell.files import Tree
 from ngswell.mesh.points import integral_on_boundary
-from ngswell.models.solid_state import FLUXES, warn_of_extrapolation
+from ngswell.models.solid_state import FLUXES, OUTPUT_UNITS, warn_of_extrapolation
 from ngswell.observers.base import Observer
-from ngswell.observers.records import Recorder
+from ngswell.observers.records import Recorder, power_of_mm, product
 from ngswell.problem.problem import Problem
 from ngswell.setup.snapshot import Snapshot
 from ngswell.streams import CSV
+
+UNKNOWN = "unit of the model"
+"""Of outputs that a model of one's own adds."""
 
 
 class Probe(Recorder):
@@ -50,6 +53,9 @@ class Probe(Recorder):
         if len(self.point) != problem.mesh.dim or not problem.mesh.Contains(*self.point):
             raise InputError(f"Probe: {self.point} is not a point of the {problem.mesh.dim}-d body")
         self._fields = {name: problem.state.output(name) for name in self.quantities}
+
+    def unit(self, name: str) -> str:
+        return OUTPUT_UNITS.get(name, UNKNOWN)
 
     def row(self, problem: Problem) -> Mapping[str, Any]:
         point = problem.mesh(*self.point)
@@ -95,12 +101,17 @@ class Integral(Recorder):
     def prepare(self, problem: Problem, begin: float, until: float) -> None:
         quantity = CF(1.0) if self.quantity is None else problem.state.output(self.quantity)
         weight = problem.kinematics.weight
+        unit = "-" if self.quantity is None else OUTPUT_UNITS.get(self.quantity, UNKNOWN)
+        self._unit = product(unit, power_of_mm(problem) - (self.boundary is not None))
         if self.boundary is None:
             self._density = (quantity * problem.state.J * weight).Compile()
         else:
             problem.setup.check_boundary("Integral", self.boundary)
             cofactor = BoundaryFromVolumeCF(problem.state.cofactor)
             self._quantity, self._measure = quantity, Norm(cofactor * problem.kinematics.normal) * weight
+
+    def unit(self, name: str) -> str:
+        return self._unit
 
     def row(self, problem: Problem) -> Mapping[str, Any]:
         mesh, order = problem.mesh, 2 * problem.model.order + 2

@@ -53,6 +53,9 @@ class Stability(Observer):
         """Rate of the fastest growing perturbation at each `time` [1/s]; 0 where none grows, infinite where without flow."""
         return np.array(self._rates)
 
+    def table(self) -> dict[str, NDArray]:
+        return {"rate [1/s]": self.rates}
+
     def prepare(self, problem: Problem, begin: float, until: float) -> None:
         for bath, treatment in problem.setup.prescribed_baths:
             if treatment.charge_of is Charge.LAST_STEP:

@@ -11,6 +11,7 @@ from ngswell.run.log import StepLog
 from ngswell.setup.setup import Setup
 from ngswell.setup.snapshot import Snapshot
 from ngswell.stepping.steps import StepReport
+from ngswell.units import readable
 
 
 @dataclass(frozen=True)
@@ -60,4 +61,4 @@ class Result:
         tally = self.log.tally
         done = f"{tally.steps} steps, {tally.iterations} Newton iterations, {self.seconds:.1f} s"
         reasons = tally.why
-        return f"t = {self.end.time:.10g} s after {done}" + (f"; rejected: {reasons}" if reasons else "")
+        return f"t = {readable(self.end.time)} after {done}" + (f"; rejected: {reasons}" if reasons else "")

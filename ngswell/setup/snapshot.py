@@ -18,5 +18,5 @@ class Snapshot:
     """
 
     time: float
-    values: NDArray
+    values: NDArray = field(repr=False)
     meaning: Mapping[str, str] | None = field(default=None, repr=False)
