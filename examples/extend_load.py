@@ -1,4 +1,4 @@
-"""A load of one's own: a pressure that stays normal to the deformed surface and follows a history."""
+"""A load of one's own: springs to where a boundary was at first, with a stiffness that follows a history."""
 
 from dataclasses import dataclass
 
@@ -8,17 +8,17 @@ from ngswell import Load, Ramp, Role, Term
 
 
 @dataclass(frozen=True)
-class FollowerPressure(Load):
-    """Outer pressure on the deformed boundary; −∫ q n · v da is its power."""
+class Springs(Load):
+    """Traction −k u per reference area."""
 
     boundary: str
-    pressure: Ramp  # [N/mm²] over time [s]
+    stiffness: Ramp  # k [N/mm³] over time [s]
 
-    schedules = property(lambda self: (self.pressure,))
+    schedules = property(lambda self: (self.stiffness,))
 
     def check_in(self, surroundings):
-        surroundings.check_boundary("FollowerPressure", self.boundary)
+        surroundings.check_boundary("Springs", self.boundary)
 
     def terms(self, state, v, clock):
-        power = InnerProduct(state.kinematics.area_vector(state.u), v)  # per reference area
-        return [Term("momentum", "pressure", clock.follow(self.pressure) * power, role=Role.LOAD, boundary=self.boundary)]
+        power = -clock.follow(self.stiffness) * InnerProduct(state.u, v)
+        return [Term("momentum", "springs", -power, role=Role.LOAD, boundary=self.boundary)]

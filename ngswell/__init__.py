@@ -58,7 +58,7 @@ from ngswell.run.restart import Restart, read_checkpoint
 from ngswell.run.result import Result
 from ngswell.scene import Scene
 from ngswell.schedules import Blend, Ramp
-from ngswell.setup.loads import Load, Traction, Weight
+from ngswell.setup.loads import Load, Pressure, Traction, Weight
 from ngswell.setup.setup import Setup
 from ngswell.setup.snapshot import Snapshot
 from ngswell.setup.supports import Pin, Roller, Support, Symmetry
@@ -76,7 +76,7 @@ __all__ = [
     "ExtrapolationWarning", "Fixed", "Frozen", "HolmesMow", "InnerLayer", "InputError", "InstabilityError",
     "InstabilityWarning", "Integral", "Lagged", "LeastSquares", "Ledger", "Load", "LocalDonnan", "MPa", "MackieMeares",
     "Material", "Multiplier", "NeoHookean", "NgswellError", "Nitsche", "Observer", "Outflow", "OutputError",
-    "OverlapWarning", "Penalty", "Pin", "PlaneStrain", "Potential", "PowerLaw", "Prescribed", "Probe", "Problem",
+    "OverlapWarning", "Penalty", "Pin", "PlaneStrain", "Potential", "PowerLaw", "Prescribed", "Pressure", "Probe", "Problem",
     "Progress", "Ramp", "Reason", "Restart", "Result", "Role", "Roller", "Scene", "Setup", "Sine", "Snapshot",
     "Snapshots", "Spatial", "Spline", "Stability", "StepError", "Support", "Symmetry", "Term", "Traction",
     "TwoLevelSolver", "Uncharged", "Weak", "Weight", "box", "by_region", "check_mesh", "column", "day", "from_occ",

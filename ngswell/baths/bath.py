@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from ngsolve import VOL, CoefficientFunction, InnerProduct
+from ngsolve import VOL, CoefficientFunction, InnerProduct, Mesh
 
 from ngswell import checks
 from ngswell.baths.lagged import Lagged
@@ -84,24 +85,41 @@ class Bath:
     def loads(
         self, kinematics: Kinematics, u: CoefficientFunction, v: CoefficientFunction, fields: BathFields
     ) -> list[Term]:
-        """The pressure on the body in the balance of total stress (16): +∫ P̄ Cof(F) N · v dA, which follows the surface.
+        """The pressure on the body in the balance of total stress (16).
 
         Nothing where P̄ is 0 throughout, or where a porous plate carries it.
         """
         if self.porous_plate or not any(self.hydraulic.values):
             return []
-        power = InnerProduct(kinematics.area_vector(u), v)
-        return [Term("momentum", "pressure of the bath", fields.P * power, role=Role.LOAD, boundary=self.boundary)]
+        return [pressing("pressure of the bath", self.boundary, fields.P, kinematics, u, v)]
 
     def check_in(self, surroundings: Surroundings) -> None:
         """Refuse boundaries that the mesh lacks, histories that its places do not allow, a treatment that does not suit."""
         mesh, model = surroundings.mesh, surroundings.model
         surroundings.check_boundary("bath", self.boundary)
-        region = VOL if mesh.dim == 1 else mesh.Boundaries(self.boundary)  # an end has no points
-        for history in self.schedules:
-            history.check_on(points(mesh, region, 4))
+        check_histories(mesh, self.boundary, self.schedules)
         treatment = surroundings.treatment(self)
         if not treatment.suits(model):
             choices = ", ".join(type(other).__name__ for other in TREATMENTS if other.suits(model))
             raise InputError(f"bath on {self.boundary!r}: {type(model).__name__} has no {treatment!r}; it has {choices}")
         treatment.check_in(surroundings, self.boundary)
+
+
+def pressing(
+    name: str,
+    boundary: str,
+    pressure: CoefficientFunction,
+    kinematics: Kinematics,
+    u: CoefficientFunction,
+    v: CoefficientFunction,
+) -> Term:
+    """A pressure [N/mm²] on the current boundary, −P n per current area: +∫ P Cof(F) N · v dA in the balance of momentum."""
+    power = InnerProduct(kinematics.area_vector(u), v)
+    return Term("momentum", name, pressure * power, role=Role.LOAD, boundary=boundary)
+
+
+def check_histories(mesh: Mesh, boundary: str, histories: Sequence[Schedule]) -> None:
+    """Refuse histories that a boundary's places do not allow."""
+    region = VOL if mesh.dim == 1 else mesh.Boundaries(boundary)  # an end has no points
+    for history in histories:
+        history.check_on(points(mesh, region, 4))

@@ -100,7 +100,7 @@ class Setup:
             self,
             supports=checks.several("supports", self.supports, Support, "Roller, Symmetry or Pin"),
             baths=checks.several("baths", self.baths, Bath, "Bath(...)"),
-            loads=checks.several("loads", self.loads, Load, "Traction or Weight"),
+            loads=checks.several("loads", self.loads, Load, "Traction, Pressure or Weight"),
             start=checks.number("start", self.start, "s", -LARGEST, LARGEST),
         )
         if self.origin is not None:
@@ -153,13 +153,15 @@ class Setup:
     def _values(self) -> dict[str, NDArray]:
         """Values of the fields of position, by what they belong to."""
         where = points(self.mesh)
-        of_baths = {
-            f"a history of the bath on {bath.boundary!r}": history.at(self.start)
-            for bath in self.baths
-            for history in bath.schedules
+        pieces = {f"the bath on {bath.boundary!r}": bath.schedules for bath in self.baths}
+        pieces |= {f"loads[{number}]": load.schedules for number, load in enumerate(self.loads)}
+        of_pieces = {
+            f"a history of {name}": history.at(self.start)
+            for name, histories in pieces.items()
+            for history in histories
             if not history.uniform
         }
-        fields = {**{f"the material's {name}": value for name, value in vars(self.material).items()}, **of_baths}
+        fields = {**{f"the material's {name}": value for name, value in vars(self.material).items()}, **of_pieces}
         return {name: value(where) for name, value in fields.items() if isinstance(value, CoefficientFunction)}
 
     def check_unchanged(self) -> None:

@@ -9,7 +9,7 @@ import pytest
 
 from examples.extend_bath import Film
 from examples.extend_function import history, note_the_middle
-from examples.extend_load import FollowerPressure
+from examples.extend_load import Springs
 from examples.extend_observer import LargestStress
 from examples.extend_solid import LogNeoHookean
 from ngswell import (
@@ -83,31 +83,41 @@ def test_each_is_short(file):
 
 # -- load --------------------------------------------------------------------------------------------------------------
 
-PRESSURE = 0.05  # N/mm²
+STIFFNESS = 0.1  # N/mm³
+HELD = {"confined": "", "plane strain": "right:x", "axisymmetric": "right:r", "3-d": "right:x back:y"}
+"""What else holds the motions' bodies, so that the top alone moves."""
+
+
+def sprung(motion, stiffness, **changes):
+    others = [Roller(*pair.split(":")) for pair in HELD[motion].split()]
+    supports = [*MOTIONS[motion][2], *others]
+    baths, springs = [Bath("top", c=0.3)], [Springs("top", stiffness)]
+    return body(motion, supports=supports, baths=baths, loads=lambda wet: springs, **changes)
 
 
 @pytest.mark.parametrize("motion", MOTIONS)
-def test_a_follower_pressure_comes_to_the_closed_form(motion):
-    scene = body(motion, loads=lambda wet: [FollowerPressure(wet, Ramp((0, PRESSURE)))])
-    found = scene.state(scene.equilibrate()).at(middle(scene), "J")
-    exact = homogeneous_equilibrium(TABLE_2, 0.3, CLOSED[motion], load=PRESSURE).J
+def test_springs_come_to_the_closed_form(motion):
+    scene = sprung(motion, Ramp((0, STIFFNESS)))
+    found = scene.state(scene.equilibrate()).at(middle(scene), "J")  # the top has moved by J − 1 times its height, 1
+    exact = homogeneous_equilibrium(TABLE_2, 0.3, "confined", load=STIFFNESS * (found - 1)).J
     assert found == pytest.approx(exact, rel=1e-10)  # homogeneous: exact in the space, Newton's method to round-off
-    assert abs(homogeneous_equilibrium(TABLE_2, 0.3, CLOSED[motion]).J - exact) > 0.1  # control: without the load
+    assert abs(homogeneous_equilibrium(TABLE_2, 0.3, "confined").J - exact) > 0.1  # control: without the load
 
 
 def test_a_load_follows_its_history():
-    history = Ramp((0, 0.0), (100, PRESSURE))
-    scene = body("plane strain", charge=CHARGED, loads=lambda wet: [FollowerPressure(wet, history)])
+    stiffness = Ramp((0, 0.0), (100, STIFFNESS))
+    scene = sprung("plane strain", stiffness, charge=CHARGED)
     assert 100.0 in [step.time for step in scene.run(200.0, Adaptive(1e-2)).steps]  # steps land where the history bends
-    scene = body("plane strain", loads=lambda wet: [FollowerPressure(wet, history)])
+    scene = sprung("plane strain", stiffness)
     rest = scene.state(scene.equilibrate(50.0)).at((0.5, 0.5), "J")
-    assert rest == pytest.approx(homogeneous_equilibrium(TABLE_2, 0.3, "plane strain", load=PRESSURE / 2).J, rel=1e-10)
-    assert "pressure on top|right" in scene.describe()
+    load = STIFFNESS / 2 * (rest - 1)
+    assert rest == pytest.approx(homogeneous_equilibrium(TABLE_2, 0.3, "confined", load=load).J, rel=1e-10)
+    assert "springs on top" in scene.describe()
 
 
 def test_a_load_says_its_refusals():
-    with pytest.raises(InputError, match="FollowerPressure: the mesh has no boundary 'lid'"):
-        body("plane strain", loads=lambda wet: [FollowerPressure("lid", Ramp((0, 1.0)))])
+    with pytest.raises(InputError, match="Springs: the mesh has no boundary 'lid'"):
+        body("plane strain", loads=lambda wet: [Springs("lid", Ramp((0, 1.0)))])
 
 
 # -- solid -------------------------------------------------------------------------------------------------------------
