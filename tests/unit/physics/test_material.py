@@ -14,7 +14,8 @@ from tests.scenes import NUMBERS, strip
     ("name", "value"),
     [
         ("mu", 0.0), ("mu", -1.0), ("mu", 2.4e5), ("lam", -0.1), ("nS0", 0.0), ("nS0", 1.0), ("nS0", 1.2), ("cfc0", -0.1),
-        ("cfc0", 200.0), ("D_plus", 0.0), ("D_minus", -1e-4), ("D_plus", 5e-10), ("K", 0.0), ("K", 1e-15), ("theta", 25.0),
+        ("cfc0", 200.0), ("D_plus", 0.0), ("D_minus", -1e-4), ("D_plus", 2e-9), ("D_minus", 2e-9),
+        ("K", 0.0), ("K", 1e-15), ("theta", 25.0),
         ("mu", math.nan), ("mu", "0.24"), ("mu", True), ("theta", CF(298.0)), ("mu", CF((1.0, 2.0))),
     ],
 )  # fmt: skip
