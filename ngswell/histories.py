@@ -9,33 +9,14 @@ from itertools import pairwise
 from math import pi, sin
 
 import numpy as np
-from ngsolve import Parameter
-from numpy.typing import NDArray
 
 from ngswell import checks
 from ngswell.errors import InputError
-from ngswell.schedules import LARGEST, Signal, through
-
-
-class Smooth:
-    """A number over time that bends gradually."""
-
-    uniform = True
-
-    def at(self, time: float) -> float:
-        """Value at `time` [s]."""
-        raise NotImplementedError
-
-    def check_on(self, where: NDArray) -> None:
-        pass
-
-    def signal(self) -> Signal:
-        parameter = Parameter(0.0)
-        return Signal(parameter, lambda time: parameter.Set(self.at(time)))
+from ngswell.schedules import LARGEST, Number, through
 
 
 @dataclass(frozen=True)
-class Sine(Smooth):
+class Sine(Number):
     """mean + amplitude sin(2π (t − start)/period) for so many whole cycles; the mean before and after.
 
     `mean` and `amplitude` in the unit of what it is for, `period` and `start` in s. Kinks are its start and end, bends its
@@ -84,7 +65,7 @@ class Sine(Smooth):
 
 
 @dataclass(frozen=True, init=False)
-class Spline(Smooth):
+class Spline(Number):
     """Smooth in time through (time [s], value) points, constant before the first and after the last.
 
     Cubic pieces with one slope at each point, by the rule of Fritsch and Butland (SIAM J. Sci. Stat. Comput. 5 (1984) 300):

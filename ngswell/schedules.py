@@ -71,8 +71,25 @@ class Schedule(Protocol):
     def signal(self) -> Signal: ...
 
 
+class Number:
+    """One number over time, the same at all places."""
+
+    uniform = True
+
+    def at(self, time: float) -> float:
+        """Value at `time` [s]."""
+        raise NotImplementedError
+
+    def check_on(self, where: NDArray) -> None:
+        pass
+
+    def signal(self) -> Signal:
+        parameter = Parameter(0.0)
+        return Signal(parameter, lambda time: parameter.Set(self.at(time)))
+
+
 @dataclass(frozen=True, init=False)
-class Ramp:
+class Ramp(Number):
     """Piecewise linear in time through (time [s], value) points, constant before the first and after the last.
 
     `Ramp((7000, 4.1), (7080, 2.7))`; one point is a constant. Points on a straight line are neither kinks nor bends. Raises
@@ -85,11 +102,6 @@ class Ramp:
     def __init__(self, *points: tuple[float, float]) -> None:
         times, values = through("Ramp", points)
         checks.set_fields(self, times=times, values=values)
-
-    uniform = True
-
-    def check_on(self, where: NDArray) -> None:
-        pass
 
     @property
     def kinks(self) -> tuple[float, ...]:
@@ -120,10 +132,6 @@ class Ramp:
             return self.values[after - 1 if after else 0]
         before, start, end = self.values[after - 1], self.times[after - 1], self.times[after]
         return before + (self.values[after] - before) / (end - start) * (time - start)
-
-    def signal(self) -> Signal:
-        parameter = Parameter(self.values[0])
-        return Signal(parameter, lambda time: parameter.Set(self.at(time)))
 
 
 @dataclass(frozen=True)

@@ -91,10 +91,9 @@ def anions_are_spent(problem: Problem) -> bool:
 
 def _anions_at_rest(problem: Problem) -> tuple[float, float]:
     """The highest charge, and the anions beside it at rest in the lowest bath [mol/l]."""
-    setup, material = problem.setup, problem.setup.material
-    cfc = max(map(abs, setup.charge.values)) * float(CF(material.cfc0)(problem.points).max())
+    setup, cfc = problem.setup, problem.largest_charge
     salt = min(value for bath in setup.baths if bath.salt is not None for value in bath.salt.values)
-    return cfc, float(donnan.anions(salt, cfc, material.Gamma))
+    return cfc, float(donnan.anions(salt, cfc, setup.material.Gamma))
 
 
 def salt_time(problem: Problem) -> float:

@@ -65,12 +65,13 @@ class Observer:
         Raises InputError without records, and OutputError for a file that exists (unless `overwrite`) or cannot be written.
         """
         what, file = f"{type(self).__name__}.to_csv", CSV(path, overwrite)
-        columns = self.table() if len(self.time) else {}
+        time = self.time  # which may be read from a file
+        columns = self.table() if len(time) else {}
         if not columns:
             raise InputError(
                 f"{what}: there are no records of numbers; Probe, Integral, Outflow and Ledger have some after a run"
             )
-        file.write(what, {"time [s]": self.time, **columns})
+        file.write(what, {"time [s]": time, **columns})
 
     def plan(self, begin: float, until: float) -> list[float]:
         """Settle the times of the records [s]; returns them, for steps to land on."""

@@ -59,8 +59,7 @@ class Probe(Recorder):
 
     def row(self, problem: Problem) -> Mapping[str, Any]:
         point = problem.mesh(*self.point)
-        content = problem.state.content(point)
-        if content <= 0 and not self._warned:
+        if not self._warned and (content := problem.state.content(point)) <= 0:
             self._warned = True
             warn_of_extrapolation("Probe", content, self.point)
         return {name: field(point) for name, field in self._fields.items()}
@@ -135,7 +134,7 @@ class Area(Integral):
 class Snapshots(Observer):
     """Whole states at the given times, for pictures (`scene.state`) and for runs that go on from them."""
 
-    def __init__(self, when: Sequence[float]) -> None:
+    def __init__(self, when: float | Sequence[float] | None) -> None:
         super().__init__(when)
         self.states: list[Snapshot] = []
 

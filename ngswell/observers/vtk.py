@@ -125,9 +125,11 @@ class VTK(Observer):
 
     def _look_at_corners(self, problem: Problem) -> None:
         """Warn, once, where the fields overshoot."""
+        if self._warned:
+            return
         contents = problem.state.content(self._corners).ravel()
         worst = int(np.argmin(contents))
-        if contents[worst] <= 0 and not self._warned:
+        if contents[worst] <= 0:
             self._warned = True
             position = CF((x, y, z)[: problem.mesh.dim])(self._corners[worst : worst + 1])
             warn_of_extrapolation("VTK", contents[worst], position.ravel())

@@ -72,12 +72,9 @@ def transport_by_potentials(
 
     c₋ grad ln c̃ = (Γ²c̃/c₊) grad c̃ has no pole at c̃ = 0. Θ, D_L as in `transport`.
     """
-    m, RT, nF = material, material.RT, porosity(J, material)
-    K = permeability(J, m)
-    D_plus, D_minus = diffusivities(nF, m)
+    m, RT = material, material.RT
     plus, minus = donnan.cations(salt, cfc, m.Gamma), donnan.anions(salt, cfc, m.Gamma)
-    D_L = cfc * K * RT / nF
-    conductance = D_plus * plus + D_minus * minus + D_L * cfc
+    nF, K, D_plus, D_minus, D_L, conductance = _mobilities(m, J, plus, minus, cfc)
     of_fluid = drive - 2 * m.phi_bath * RT * grad_salt
     of_anions = (m.Gamma**2 * salt / plus) * grad_salt  # c₋ grad ln c̃
     of_cations = (2 * (D_minus - D_L) * of_anions - D_L / RT * of_fluid) / conductance  # grad µ₊
@@ -111,13 +108,10 @@ def transport(
     non-uniform charge would not come to rest. (20) is taken with the porosity that D_L in (22) needs; ion saturations
     are zero. K and D± are those of the material's laws.
     """
-    RT, nF = material.RT, porosity(J, material)
-    K = permeability(J, material)
-    D_plus, D_minus = diffusivities(nF, material)
+    RT = material.RT
+    nF, K, D_plus, D_minus, D_L, conductance = _mobilities(material, J, c, c - cfc, cfc)
     if material.phi != 1:
         drive = drive + (1 - material.phi) * RT * (2 * grad_c - grad_cfc)
-    D_L = cfc * K * RT / nF
-    conductance = D_plus * c + D_minus * (c - cfc) + D_L * cfc
     field = -1 / conductance * (D_L / RT * drive - (D_minus - D_plus) * grad_c + D_minus * grad_cfc)  # grad E / Rθ
     fluid = -K * (drive + RT * cfc * field)
     plus = -nF * D_plus * (grad_c + c * field) + c * fluid
@@ -135,13 +129,33 @@ def own_conductances(
 
     The moduli stand for D₋ − D₊ and 1 − φ (times at most c L): the fluxes of unlike signs do not make a penalty negative.
     """
-    RT, nF = material.RT, porosity(J, material)
-    K = permeability(J, material)
-    D_plus, D_minus = diffusivities(nF, material)
-    D_L = cfc * K * RT / nF
-    conductance = D_plus * c + D_minus * (c - cfc) + D_L * cfc
+    nF, K, D_plus, D_minus, D_L, conductance = _mobilities(material, J, c, c - cfc, cfc)
     fluid = K * (1 - D_L * cfc / conductance)
     cations = nF * D_plus + Norm(CF(D_minus - D_plus)) * c * nF * (D_plus + D_L) / conductance
     if material.phi != 1:
-        cations = cations + 2 * abs(1 - material.phi) * RT * c * fluid
+        cations = cations + 2 * abs(1 - material.phi) * material.RT * c * fluid
     return fluid, cations
+
+
+class _Mobilities(NamedTuple):
+    """What fluxes are made of: nF, K, D₊ and D₋ by the material's laws, D_L and Θ as in `transport`."""
+
+    nF: CoefficientFunction
+    K: Field
+    D_plus: Field
+    D_minus: Field
+    D_L: CoefficientFunction
+    conductance: CoefficientFunction
+
+
+def _mobilities(
+    material: Material,
+    J: CoefficientFunction,
+    cations: CoefficientFunction,
+    anions: CoefficientFunction,
+    cfc: CoefficientFunction,
+) -> _Mobilities:
+    nF, K = porosity(J, material), permeability(J, material)
+    D_plus, D_minus = diffusivities(nF, material)
+    D_L = cfc * K * material.RT / nF
+    return _Mobilities(nF, K, D_plus, D_minus, D_L, D_plus * cations + D_minus * anions + D_L * cfc)

@@ -66,13 +66,14 @@ class Discretisation:
         return Storage(self.mesh, self.kinematics.weight)
 
     @property
-    def _largest_charge(self) -> float:
+    def largest_charge(self) -> float:
+        """The highest fixed charge of the reference configuration, at any time and place [mol/l]."""
         return self.setup.material.largest("cfc0", self.mesh) * max(map(abs, self.setup.charge.values))
 
     @cached_property
     def round_off(self) -> dict[str, float]:
         """What round-off leaves undetermined of unknowns, in their units."""
-        return self.model.round_off(self._largest_charge, self.setup.material.RT)
+        return self.model.round_off(self.largest_charge, self.setup.material.RT)
 
     @cached_property
     def references(self) -> dict[str, float]:
@@ -80,7 +81,7 @@ class Discretisation:
         setup = self.setup
         corners = vertices(self.mesh)
         length = float(np.linalg.norm(corners.max(axis=0) - corners.min(axis=0)))
-        charge = self._largest_charge
+        charge = self.largest_charge
         salts = [value for bath in setup.baths if bath.salt for value in bath.salt.values]
         own = self.model.references(max([charge, *salts]), setup.material.largest("mu", self.mesh), length)
         multipliers = self.names[len(own) :]  # in the units of p and c

@@ -29,7 +29,7 @@ def content_integrals(discretisation: Discretisation, term: Term, factor: Any = 
     """
     storage = discretisation.storage
     of_cell = discretisation.kinematics.weight * term.integrand
-    of_corner = discretisation.storage.vertex_weights * term.integrand
+    of_corner = storage.vertex_weights * term.integrand
     if factor is not None:
         of_cell, of_corner = factor * of_cell, factor * of_corner
     return [

@@ -23,14 +23,13 @@ from ngswell import (
     Concentration,
     Confined,
     DampedNewton,
-    Observer,
     PlaneStrain,
     Potential,
-    Problem,
     Ramp,
     Result,
     Roller,
     Scene,
+    Snapshots,
     Symmetry,
     Traction,
     column,
@@ -47,17 +46,6 @@ COMPARED = 20
 """States of each run at which it is compared, spread over its steps, the first and the last among them."""
 
 
-class _States(Observer):
-    """`values`: all coefficients, a record each."""
-
-    def __init__(self, when: Sequence[float] | None) -> None:
-        super().__init__(when)
-        self.values: list[NDArray] = []
-
-    def record(self, problem: Problem, time: float) -> None:
-        self.values.append(problem.vector.copy())
-
-
 @dataclass(frozen=True)
 class RandomRun:
     """A scene, the state that it starts from (None: at rest under its load) and its end [s]."""
@@ -69,9 +57,9 @@ class RandomRun:
 
     def states(self, steps: Adaptive, when: Sequence[float] | None = None, newton: DampedNewton | None = None) -> Computed:
         """The states after all steps, or at the times `when`, which they then land on."""
-        watched = _States(when)
+        watched = Snapshots(when)
         result = self.scene.run(self.end, steps, [watched], newton=newton, resume=self.begin, unstable="off")
-        return Computed(np.array(watched.time), np.array(watched.values), result)
+        return Computed(np.array(watched.time), np.array([state.values for state in watched.states]), result)
 
 
 @dataclass(frozen=True)
