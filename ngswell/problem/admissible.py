@@ -22,6 +22,9 @@ class Violation(NamedTuple):
     reason: Reason
 
 
+CONTENT = "fluid content J − nS0"
+"""What is not positive where a body is squeezed dry."""
+
 TURNED = "J at a cell's corner"
 """What is not positive where a cell turns over."""
 
@@ -38,7 +41,11 @@ class Admissible:
     @cached_property
     def always(self) -> dict[str, CoefficientFunction]:
         """At the forms' own points, where laws are evaluated."""
-        return _compiled({"fluid content J − nS0": self._state.content}) | self.of_ions
+        return _compiled({CONTENT: self._state.content}) | self.of_ions
+
+    def least_content(self) -> float:
+        """The smallest J − nS0 at the watched points [-]."""
+        return float(self.always[CONTENT](self._discretisation.points).min())
 
     @cached_property
     def of_ions(self) -> dict[str, CoefficientFunction]:

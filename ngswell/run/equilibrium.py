@@ -35,6 +35,9 @@ LONGEST, SHORTEST = 1e12, 1e-12
 SHRUNK = 1e-6
 """Relaxation gives up when its steps have fallen below this share of the longest that succeeded."""
 
+DRY = 1e-6
+"""Fluid volume per reference volume below which nothing flows any more: every pressure would be at rest there."""
+
 MOST_STEPS = 300
 """Steps that relaxation tries. To rest it takes some 30 to 60; without a state of rest it might creep on for ever."""
 
@@ -52,7 +55,7 @@ def equilibrate(
     The stationary balances are solved by continuation: from the uncharged body, already loaded, the charge is raised as
     fast as Newton's method follows. Where that ends early, as under a load that only the charged body can bear, the body
     relaxes from its initial state instead, in steps of backward Euler that grow as fast as Newton's method follows. Works
-    for fields of position and constrained bodies. `observers` record the state of rest. Raises InputError for a sealed body
+    for fields of position and constrained bodies. A body squeezed dry, where nothing flows any more, is not at rest. `observers` record the state of rest. Raises InputError for a sealed body
     (what it holds is not determined by balances) and for treatments that remember the past, and StepError when neither way
     reaches the state of rest; `end` of the error is the initial state.
     """
@@ -122,7 +125,7 @@ class _Rest:
             problem.begin_step(self.time, step)
             if self.newton.solve(problem, self.factorisation).failure is None:
                 if step == STATIONARY:
-                    return True
+                    return problem.admissible.least_content() > DRY
                 longest, state = max(longest, step), problem.vector.copy()
                 step = 10 * step if step < LONGEST else STATIONARY
             else:
