@@ -55,7 +55,8 @@ def equilibrate(
     The stationary balances are solved by continuation: from the uncharged body, already loaded, the charge is raised as
     fast as Newton's method follows. Where that ends early, as under a load that only the charged body can bear, the body
     relaxes from its initial state instead, in steps of backward Euler that grow as fast as Newton's method follows. Works
-    for fields of position and constrained bodies. A body squeezed dry, where nothing flows any more, is not at rest. `observers` record the state of rest. Raises InputError for a sealed body
+    for fields of position and constrained bodies. A body squeezed dry, where nothing flows any more, is not at rest.
+    `observers` record the state of rest. Raises InputError for a sealed body
     (what it holds is not determined by balances) and for treatments that remember the past, and StepError when neither way
     reaches the state of rest; `end` of the error is the initial state.
     """
