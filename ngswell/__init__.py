@@ -44,6 +44,7 @@ from ngswell.observers.coarseness import Coarseness
 from ngswell.observers.ledger import Ledger
 from ngswell.observers.outflow import Outflow
 from ngswell.observers.progress import Progress
+from ngswell.observers.reaction import Reaction
 from ngswell.observers.sampling import Area, Integral, Probe, Snapshots
 from ngswell.observers.stability import Stability
 from ngswell.observers.vtk import VTK
@@ -77,7 +78,7 @@ __all__ = [
     "InstabilityWarning", "Integral", "Lagged", "LeastSquares", "Ledger", "Load", "LocalDonnan", "MPa", "MackieMeares",
     "Material", "Multiplier", "NeoHookean", "NgswellError", "Nitsche", "Observer", "Outflow", "OutputError",
     "OverlapWarning", "Penalty", "Pin", "PlaneStrain", "Potential", "PowerLaw", "Prescribed", "Pressure", "Probe", "Problem",
-    "Progress", "Ramp", "Reason", "Restart", "Result", "Role", "Roller", "Scene", "Setup", "Sine", "Snapshot",
+    "Progress", "Ramp", "Reaction", "Reason", "Restart", "Result", "Role", "Roller", "Scene", "Setup", "Sine", "Snapshot",
     "Snapshots", "Spatial", "Spline", "Stability", "StepError", "Support", "Symmetry", "Term", "Traction",
     "TwoLevelSolver", "Uncharged", "Weak", "Weight", "box", "by_region", "check_mesh", "column", "day", "from_occ",
     "hour", "kPa", "metre", "micrometre", "read_checkpoint", "read_mesh", "rectangle", "year",

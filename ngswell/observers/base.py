@@ -69,7 +69,7 @@ class Observer:
         columns = self.table() if len(time) else {}
         if not columns:
             raise InputError(
-                f"{what}: there are no records of numbers; Probe, Integral, Outflow and Ledger have some after a run"
+                f"{what}: there are no records of numbers; Probe, Integral, Outflow, Reaction, Ledger have some after a run"
             )
         file.write(what, {"time [s]": time, **columns})
 

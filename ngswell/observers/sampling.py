@@ -76,7 +76,7 @@ class Integral(Recorder):
     With `to`, a path or a `CSV`, records go to that file.
 
     Raises InputError for a flux on a boundary: `Outflow` has it from the balances. "stress" is made of derivatives too: its
-    integral over a held side or a corner is off at any mesh where the stress is singular, and is no reaction.
+    integral over a held side or a corner is off at any mesh where the stress is singular; `Reaction` has the force there.
     """
 
     def __init__(

@@ -1,0 +1,104 @@
+"""The force on a held boundary, from the balance of momentum."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ngswell import checks
+from ngswell.errors import InputError
+from ngswell.mesh.points import vertices_of
+from ngswell.observers.records import Recorder, power_of_mm
+from ngswell.problem.problem import Problem
+from ngswell.setup.setup import Setup
+from ngswell.streams import CSV
+
+UNITS = ("N/mm²", "N/mm", "N")
+"""Of forces on a point of a column, on a line in plane strain and on a surface."""
+
+
+class Reaction(Recorder):
+    """Force with which the body pushes on what holds a boundary: a vector along the directions of the motion.
+
+        base = Reaction("bottom")  # or "bottom|left", their sum
+
+    Not taken from derivatives: it is what the balance of momentum (16) lacks at the displacements that supports hold there.
+    All held boundaries together bear the sum of the loads, a bath's pressure among them, to what the solves leave (along r
+    the hoop stress bears a share). Directions that are not held have 0. A vertex that several held boundaries share counts,
+    in each direction, with the one whose support stands first in the scene; a pinned vertex counts with the first held
+    boundary that it is on, and with none if it is on none.
+
+    `values` has one row a time: N/mm² in a column, N per mm of thickness in plane strain, N in space, and N on the whole
+    circumference, 2π, when axisymmetric; along r that is the sum of the radial forces. At a start out of balance it is that
+    of the fields as they are. With `to`, a path or a `CSV`, records go to that file. Raises InputError for a boundary on
+    which nothing is held.
+    """
+
+    def __init__(
+        self,
+        boundary: str,
+        when: float | Sequence[float] | None = None,
+        to: str | Path | CSV | None = None,
+    ) -> None:
+        checks.name("Reaction: boundary", boundary, "bottom")
+        self.boundary = boundary
+        super().__init__(when, boundary, to=to)
+
+    def prepare(self, problem: Problem, begin: float, until: float) -> None:
+        names, owners = problem.setup.check_boundary("Reaction", self.boundary), _owners(problem.setup)
+        for name in names:
+            if name not in owners.values():
+                held = ", ".join(sorted(map(repr, set(owners.values())))) or "none"
+                raise InputError(f"Reaction: nothing is held on {name!r}; held boundaries are {held}")
+        directions = problem.kinematics.directions
+        displacement = problem.ranges[problem.names[0]]
+        per_component = (displacement.stop - displacement.start) // len(directions)
+        self._dofs = [
+            [
+                displacement.start + axis * per_component + vertex
+                for (vertex, held), name in owners.items()
+                if held == direction and name in names
+            ]
+            for axis, direction in enumerate(directions)
+        ]
+        self._lacks, self._unit = problem.fields.vec.CreateVector(), UNITS[power_of_mm(problem) - 1]
+
+    def unit(self, name: str) -> str:
+        return self._unit
+
+    def row(self, problem: Problem) -> Mapping[str, Any]:
+        problem.outflow(self._lacks)
+        lacks = self._lacks.FV().NumPy()
+        return {"force": [-lacks[dofs].sum() for dofs in self._dofs]}
+
+    @property
+    def values(self) -> NDArray:
+        """Forces, one row a time."""
+        return self._table.columns().get("force", np.zeros((0, 0)))
+
+
+def _owners(setup: Setup) -> dict[tuple[int, str], str]:
+    """The boundary with which each held pair of a vertex and a direction counts."""
+    owners: dict[tuple[int, str], str] = {}
+    vertices: dict[str, set[int]] = {}
+    for direction, name in _held(setup):
+        vertices.setdefault(name, vertices_of(setup.mesh, name))
+        for vertex in vertices[name]:
+            owners.setdefault((vertex, direction), name)
+    for vertex, direction in setup.pins():
+        for name in vertices:
+            if vertex in vertices[name]:
+                owners.setdefault((vertex, direction), name)
+    return owners
+
+
+def _held(setup: Setup) -> Iterator[tuple[str, str]]:
+    """Directions and the single boundaries on which supports hold them, in the order of the scene."""
+    for support in setup.supports:
+        for direction, boundary in support.fixed(setup).items():
+            for name in filter(None, boundary.split("|")):
+                yield direction, name
