@@ -33,6 +33,8 @@ FALLING = Ramp((0, 0.15), (10, 0.125))  # s, mol/l
 NUMBERS = {"mu": 0.24, "lam": 0.02, "nS0": 0.25, "cfc0": 0.2, "D_plus": 5e-4, "D_minus": 8e-4, "K": 1e-3}
 """What a material needs."""
 UNCHARGED = Material(**{**NUMBERS, "cfc0": 0.0})
+"""Salt beside a solid without charge."""
+WITHOUT_IONS = Material(mu=0.24, lam=0.02, nS0=0.25, K=1e-3)
 
 
 def strip(treatment=WEAK, c=0.15, cells=(1, 30), **changes) -> Scene:

@@ -101,8 +101,8 @@ def salt_time(problem: Problem) -> float:
     setup, places = problem.setup, vertices(problem.mesh)
     wet = [sorted(vertices_of(problem.mesh, bath.boundary)) for bath in setup.baths]
     far = max(min(float(np.linalg.norm(places[numbers] - place, axis=1).min()) for numbers in wet) for place in places)
-    material = setup.material
-    D = CF(2 * material.D_plus * material.D_minus / (material.D_plus + material.D_minus))(problem.points).min()
+    D_plus, D_minus = setup.material.diffusivities
+    D = CF(2 * D_plus * D_minus / (D_plus + D_minus))(problem.points).min()
     cfc, anions = _anions_at_rest(problem)
     return cfc / (2 * anions) * far**2 / float(D)
 

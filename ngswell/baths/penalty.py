@@ -38,12 +38,12 @@ class Penalty(Weak):
         return f"weak, ε = {self.relative:g} K/h and D₊/h"
 
     def factors(self, contact: Contact) -> tuple[Field, Field]:
-        """ε for p [mm³/(N s)] and for c [mm/s]: numbers, or fields where K or D₊ are."""
+        """ε for p [mm³/(N s)] and for c [mm/s]: numbers, or fields where K or D₊ are; 0 for a c that is none."""
         if self.relative is None:
             return self.epsilon, self.epsilon
-        state = contact.state
-        D_plus, _ = laws.diffusivities(state.nF, state.material)
-        return self.relative / contact.h * state.permeability, self.relative / contact.h * D_plus
+        state, per_size = contact.state, self.relative / contact.h
+        D_plus = laws.diffusivities(state.nF, state.material)[0] if "cations" in contact.excess else 0.0
+        return per_size * state.permeability, per_size * D_plus
 
     def terms(self, contact: Contact) -> list[Term]:
         factors = self.factors(contact)

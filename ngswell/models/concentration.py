@@ -9,7 +9,7 @@ from typing import ClassVar
 
 from ngsolve import H1, CoefficientFunction, FESpace, InnerProduct, Mesh, sqrt
 
-from ngswell.models.model import BathData, BathFields, FieldContext, check_order, needs_salt
+from ngswell.models.model import BathData, BathFields, FieldContext, check_order, needs_ions, needs_salt
 from ngswell.models.solid_state import SolidState
 from ngswell.models.term import Kind, Term
 from ngswell.physics import donnan, laws
@@ -89,6 +89,7 @@ class Concentration:
         check_order("Concentration", self.order)
 
     def check(self, material: Material, baths: Sequence[BathData]) -> None:
+        needs_ions("Concentration", material)
         needs_salt("Concentration", baths)
 
     def space(self, mesh: Mesh, kinematics: Kinematics, fixed: dict[str, str], prescribed: str) -> FESpace:

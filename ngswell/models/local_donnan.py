@@ -9,7 +9,7 @@ from typing import ClassVar
 from ngsolve import CoefficientFunction
 
 from ngswell.errors import InputError
-from ngswell.models.model import BathData, FieldContext
+from ngswell.models.model import BathData, FieldContext, needs_ions
 from ngswell.models.one_pressure import OnePressure
 from ngswell.models.virtual_bath import VirtualBathState
 from ngswell.physics import laws
@@ -54,6 +54,7 @@ class LocalDonnan(OnePressure):
     evolving: ClassVar[dict[str, float]] = {"u": 1e-2, "P": 1e-1}
 
     def check(self, material: Material, baths: Sequence[BathData]) -> None:
+        needs_ions("LocalDonnan", material)
         if not baths or any(bath.salt is None for bath in baths):
             raise InputError("LocalDonnan needs a bath with its salt concentration c [mol/l]")
         for bath in baths:

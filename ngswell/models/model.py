@@ -13,7 +13,7 @@ from ngswell.checks import Field
 from ngswell.errors import InputError
 from ngswell.models.term import Term
 from ngswell.physics.kinematics import Kinematics
-from ngswell.physics.material import Material
+from ngswell.physics.material import NO_IONS, Material
 
 
 class BathFields(NamedTuple):
@@ -124,6 +124,12 @@ def needs_salt(model: str, baths: Sequence[BathData]) -> None:
     for bath in baths:
         if bath.salt is None:
             raise InputError(f"bath on {bath.boundary!r}: {model} needs its salt concentration c [mol/l]")
+
+
+def needs_ions(model: str, material: Material) -> None:
+    """Refuse a material without diffusivities."""
+    if material.D_plus is None:
+        raise InputError(f"{model}: {NO_IONS}")
 
 
 def check_order(model: str, order: int) -> None:

@@ -8,7 +8,7 @@ from typing import ClassVar
 
 from ngsolve import H1, CoefficientFunction, FESpace, InnerProduct, Mesh
 
-from ngswell.models.model import BathData, BathFields, FieldContext, check_order, needs_salt
+from ngswell.models.model import BathData, BathFields, FieldContext, check_order, needs_ions, needs_salt
 from ngswell.models.term import Kind, Term
 from ngswell.models.virtual_bath import VirtualBathState
 from ngswell.physics import laws
@@ -55,6 +55,7 @@ class Potential:
         check_order("Potential", self.order)
 
     def check(self, material: Material, baths: Sequence[BathData]) -> None:
+        needs_ions("Potential", material)
         needs_salt("Potential", baths)
 
     def space(self, mesh: Mesh, kinematics: Kinematics, fixed: dict[str, str], prescribed: str) -> FESpace:

@@ -42,7 +42,8 @@ def permeability(J: CoefficientFunction, material: Material) -> Field:
 
 def diffusivities(nF: CoefficientFunction, material: Material) -> tuple[Field, Field]:
     """D₊ and D₋ by the material's law [mm²/s]."""
-    return material.diffusivity(material.D_plus, nF), material.diffusivity(material.D_minus, nF)
+    D_plus, D_minus = material.diffusivities
+    return material.diffusivity(D_plus, nF), material.diffusivity(D_minus, nF)
 
 
 class Transport(NamedTuple):

@@ -27,22 +27,28 @@ STRESS_FREE = 1e-9
 LAWS = ("solid", "permeability", "diffusivity")
 """The parameters that are laws."""
 
+DIFFUSIVITIES = ("D_plus", "D_minus")
+"""The parameters that a material without ions does not have."""
+
+NO_IONS = "the material has no ions: give it cfc0 [mol/l], D_plus and D_minus [mm²/s], or take the model Uncharged()"
+
 
 @dataclass(frozen=True, kw_only=True)
 class Material:
     """A charged hydrated porous solid and its pore fluid.
 
     The parameters up to K are floats or CoefficientFunctions of position in the reference configuration, the others are one
-    number or one law; left out, they are the paper's. Raises InputError for a value outside its possible (or, by orders of
-    magnitude, plausible) range; fields of position are checked when a scene brings the mesh.
+    number or one law; left out, they are the paper's. A material without ions, for `Uncharged`, leaves out cfc0, which is 0
+    then, D_plus and D_minus. Raises InputError for a value outside its possible (or, by orders of magnitude, plausible)
+    range; fields of position are checked when a scene brings the mesh.
     """
 
     mu: Field  # µS, shear modulus of the drained solid [N/mm²]
     lam: Field  # λS, second Lamé constant [N/mm²]
     nS0: Field  # nS0S, solidity of the reference configuration [-]
-    cfc0: Field  # cfc0S, fixed charge per fluid volume of the reference configuration [mol/l]
-    D_plus: Field  # D₊, cation diffusivity in the pore fluid (before a diffusivity law) [mm²/s]
-    D_minus: Field  # D₋, anion diffusivity, likewise [mm²/s]
+    cfc0: Field = None  # cfc0S, fixed charge per fluid volume at the start [mol/l]; never None
+    D_plus: Field | None = None  # D₊, cation diffusivity in the pore fluid (before a diffusivity law) [mm²/s]
+    D_minus: Field | None = None  # D₋, anion diffusivity, likewise [mm²/s]
     K: Field  # kF/γFR, Darcy permeability over effective fluid weight, at J = 1 [mm⁴/(N s)]
     theta: float = 298.0  # θ, temperature [K]
     solid: SolidLaw = NeoHookean()  # ψ(F)
@@ -53,6 +59,7 @@ class Material:
     Gamma: float = 1.0  # Γ = γ̄/γ, mean activity coefficient of the salt in the bath over that in the gel [-]
 
     def __post_init__(self) -> None:
+        self._check_ions()
         checks.instance("solid", self.solid, SolidLaw, "a law with energy(deformation, material), such as NeoHookean()")
         reference = _sample("permeability", self.permeability, (1.0, 1.0, 0.5), "K(K0, J, nS0) such as PowerLaw(m=2.0)")
         if not abs(reference - 1) <= 1e-12:
@@ -64,7 +71,7 @@ class Material:
             )
         for field in fields(self):
             value = getattr(self, field.name)
-            if field.name in LAWS:
+            if field.name in LAWS or (field.name in DIFFUSIVITIES and value is None):
                 continue
             if isinstance(value, CoefficientFunction):
                 if field.name in ONE_NUMBER:
@@ -72,6 +79,27 @@ class Material:
                 checks.scalar(field.name, value)
             else:
                 checks.set_fields(self, **{field.name: within(field.name, value)})
+
+    def _check_ions(self) -> None:
+        """Refuse a material with some of its ions' parameters; with none it has no charge."""
+        absent = [name for name in DIFFUSIVITIES if getattr(self, name) is None]
+        if self.cfc0 is None:
+            if len(absent) < len(DIFFUSIVITIES):
+                raise InputError("cfc0 is missing beside D_plus and D_minus: give the fixed charge [mol/l], 0.0 for none")
+            checks.set_fields(self, cfc0=0.0)
+        charged = not checks.is_number(self.cfc0) or self.cfc0 != 0
+        if absent and (charged or len(absent) < len(DIFFUSIVITIES)):
+            raise InputError(
+                f"{' and '.join(absent)} [mm²/s] missing: ions have both diffusivities, D_plus and D_minus; a material "
+                "without ions, for Uncharged(), has neither and no cfc0"
+            )
+
+    @property
+    def diffusivities(self) -> tuple[Field, Field]:
+        """D₊ and D₋, before any law [mm²/s]. Raises InputError for a material without ions."""
+        if self.D_plus is None or self.D_minus is None:
+            raise InputError(NO_IONS)
+        return self.D_plus, self.D_minus
 
     @property
     def RT(self) -> float:
@@ -81,6 +109,8 @@ class Material:
     def number(self, name: str) -> float:
         """The parameter `name` as one number, for closed forms; InputError if it is a field of position."""
         value = getattr(self, name)
+        if value is None:
+            raise InputError(NO_IONS)
         if isinstance(value, CoefficientFunction):
             raise InputError(f"{name} varies in space: closed forms hold for a homogeneous body, give a number")
         return float(value)

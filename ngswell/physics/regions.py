@@ -59,5 +59,11 @@ def _material(mesh: Mesh, materials: dict[str, Material]) -> Material:
                 f"by_region: {name} is {checks.short(value)} in {first!r} but {checks.short(values[other])} in {other!r}; "
                 "it has to be the same in every region"
             )
+        without = [region for region, another in values.items() if another is None]
+        if without and len(without) < len(values):
+            raise InputError(
+                f"by_region: {name} is missing in {', '.join(map(repr, without))}; give every region's material its ions, "
+                "cfc0 = 0.0 where there is no charge"
+            )
         given[name] = value if other is None else _field(mesh, values)
     return Material(**given)

@@ -80,7 +80,7 @@ class Problem(Discretisation):
             multipliers = dict(zip(self.model.balanced, pairs, strict=True)) if treatment.multipliers else {}
             excess = self.model.excess(state, self.baths[bath.boundary])
             h = cell_size(self.mesh, bath.boundary)
-            sizes = {name: self.setup.material.largest(of, self.mesh) / h for name, of in CONDUCTANCES.items()}
+            sizes = {name: self.setup.material.largest(CONDUCTANCES[name], self.mesh) / h for name in excess}
             order = self.model.order
             terms += treatment.terms(Contact(bath.boundary, state, excess, tested, multipliers, h, order, sizes))
         return terms

@@ -83,7 +83,8 @@ def random_run(number: int) -> RandomRun:
     body, model, event = BODIES[number % 3], MODELS[number // 3 % 2], EVENTS[number // 2 % 8]
     material = (TABLE_1, TABLE_2)[rng.integers(2)]
     height = float(rng.choice([0.5, 1.0]))  # mm
-    end = height**2 / material.D_plus / 2 * float(10 ** rng.uniform(-1, 1))  # about the time in which salt diffuses through
+    # about the time in which salt diffuses through
+    end = height**2 / material.number("D_plus") / 2 * float(10 ** rng.uniform(-1, 1))
     before = float(10 ** rng.uniform(-1.3, 0.3))  # bath [mol/l]
     after = before * float(10 ** rng.uniform(-0.6, 0.3))
     span = end * float(10 ** rng.uniform(-2.5, -0.3))

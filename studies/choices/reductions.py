@@ -90,7 +90,7 @@ class Disturbance:
     @property
     def material(self) -> Material:
         """Table 1 with the case's charge and diffusivities."""
-        D_plus, D_minus = float(TABLE_1.D_plus), float(TABLE_1.D_minus)
+        D_plus, D_minus = TABLE_1.number("D_plus"), TABLE_1.number("D_minus")
         D = 2 * D_plus * D_minus / (D_plus + D_minus)
         factor = H * float(TABLE_1.K) / (self.ratio * D)
         return replace(TABLE_1, cfc0=self.cfc0, D_plus=factor * D_plus, D_minus=factor * D_minus)

@@ -134,7 +134,7 @@ def at_rest(scene: Scene) -> float:
 
 # -- consolidation -----------------------------------------------------------------------------------------------------
 
-DRAINED = Material(mu=0.24, lam=0.16, nS0=0.25, cfc0=0.0, D_plus=5e-4, D_minus=8e-4, K=1e-3)
+DRAINED = Material(mu=0.24, lam=0.16, nS0=0.25, K=1e-3)
 LOAD = 1e-6 * 0.24  # N/mm²: the finite-strain model is linear to 1e-6
 EXACT = DampedNewton(tolerance=1e-12)
 

@@ -30,7 +30,7 @@ from ngswell import (
     Weight,
     column,
 )
-from tests.scenes import UNCHARGED, strip
+from tests.scenes import WITHOUT_IONS, strip
 
 
 @pytest.mark.parametrize(
@@ -89,14 +89,14 @@ from tests.scenes import UNCHARGED, strip
         (
             {
                 "model": Uncharged(),
-                "material": UNCHARGED,
+                "material": WITHOUT_IONS,
                 "baths": [Bath("top", treatment=Nitsche())],
                 "initial": (None, 0.0),
             },
             r"Uncharged has no Nitsche\(.*it has Essential, Penalty",
         ),
         ({"model": Uncharged()}, "cfc0"),
-        ({"model": Uncharged(), "material": UNCHARGED}, "takes no concentration"),
+        ({"model": Uncharged(), "material": WITHOUT_IONS}, "takes no concentration"),
         ({"model": LocalDonnan(), "baths": []}, "needs a bath"),
         ({"mesh": "top"}, "mesh has to be a mesh of NGSolve.*'top'"),
         ({"kinematics": PlaneStrain}, "kinematics has to be .*got the class PlaneStrain"),
@@ -130,7 +130,7 @@ def test_zero_current_is_named_where_it_is_more_than_conservation_of_charge():
     """In 2-d and 3-d between baths that differ; in 1-d both agree, and without ions there is no current."""
     constant, changing = Ramp((0, 0.15)), Ramp((0, 0.15), (10, 0.1))
     blended = Blend(constant, changing, 50 * x)
-    uncharged = {"model": Uncharged(), "material": UNCHARGED, "loads": []}
+    uncharged = {"model": Uncharged(), "material": WITHOUT_IONS, "loads": []}
 
     def named(**changes):
         return "zero current" in strip(None, **{"model": Potential(), "cells": (1, 2), **changes}).describe()

@@ -35,7 +35,7 @@ from ngswell.models.term import Term
 from ngswell.physics.solid import extra_stress
 from studies.limits.verification import quarter_disc
 
-SOLID = {"mu": 0.24, "lam": 0.16, "nS0": 0.25, "cfc0": 0.0, "D_plus": 5e-4, "D_minus": 8e-4}
+SOLID = {"mu": 0.24, "lam": 0.16, "nS0": 0.25}
 MATERIAL = Material(**SOLID, K=1e-3)
 M = 0.64  # 2µ + λ [N/mm²]
 LOAD = 1e-6 * 0.24

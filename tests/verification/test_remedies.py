@@ -42,7 +42,7 @@ from ngswell.errors import REMEDIES, Reason
 from ngswell.physics import donnan
 from ngswell.schedules import Schedule, Signal
 from ngswell.solve.direct import LinearSolver
-from tests.scenes import UNCHARGED, confined_column, strip
+from tests.scenes import WITHOUT_IONS, confined_column, strip
 
 
 def body(**changes):
@@ -63,7 +63,9 @@ def gel(c, **changes):
 
 
 def pressed(load, **changes):
-    return body(**{"model": Uncharged(), "material": UNCHARGED, "baths": [Bath("top|right")], "loads": down(load)} | changes)
+    return body(
+        **{"model": Uncharged(), "material": WITHOUT_IONS, "baths": [Bath("top|right")], "loads": down(load)} | changes
+    )
 
 
 def down(load):

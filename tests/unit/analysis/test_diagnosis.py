@@ -32,10 +32,10 @@ from ngswell.errors import Reason
 from ngswell.mesh.parts import Sides
 from ngswell.mesh.points import corners, points
 from studies.hard_cases.bonded import released_body
-from tests.scenes import P0, UNCHARGED, confined_column, strip
+from tests.scenes import P0, WITHOUT_IONS, confined_column, strip
 
 MODELS = {
-    "Uncharged": (Uncharged(), UNCHARGED, None),
+    "Uncharged": (Uncharged(), WITHOUT_IONS, None),
     "Potential": (Potential(), TABLE_1, 0.15),
     "Concentration": (Concentration(), TABLE_1, 0.15),
 }

@@ -77,7 +77,7 @@ MODELS = {
     "Uncharged": Uncharged(),
 }
 FULL = Ramp((0, 1.0))
-UNCHARGED = Material(mu=0.12, lam=0.02, nS0=0.25, cfc0=0.0, D_plus=5e-4, D_minus=8e-4, K=1e-3)
+UNCHARGED = Material(mu=0.12, lam=0.02, nS0=0.25, K=1e-3)
 
 
 def scene(mesh, model=MODELS["Potential"], kinematics=None, treatment=None, charge=FULL) -> Scene:

@@ -116,7 +116,7 @@ def test_the_sign_where_derivatives_have_the_other():
     assert result.state.at((0.5,), "seepage")[0] < -1e-3  # the control
 
 
-GEL = Material(mu=0.24, lam=0.16, nS0=0.25, cfc0=0.0, D_plus=5e-4, D_minus=8e-4, K=1e-3)
+GEL = Material(mu=0.24, lam=0.16, nS0=0.25, K=1e-3)
 LOAD = 1e-6 * 0.24  # departs from the linear theory by 1e-6 of the signal
 
 

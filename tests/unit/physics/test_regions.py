@@ -127,6 +127,7 @@ def test_what_agrees_stays_one_number():
         ({"core": TABLE_1, "skin": replace(TABLE_1, theta=310.0)}, "theta is 298.0 in 'core' but 310.0 in 'skin'"),
         ({"core": TABLE_1, "skin": replace(TABLE_1, Gamma=0.9)}, "Gamma .* same in every region"),
         ({"core": TABLE_1, "skin": replace(TABLE_1, permeability=PowerLaw(2.0))}, "permeability .* PowerLaw"),
+        ({"core": TABLE_1, "skin": Material(mu=1.0, lam=0.0, nS0=0.2, K=1e-3)}, "D_plus is missing in 'skin'"),
         ({"core": TABLE_1, "skin": replace(TABLE_1, diffusivity=MackieMeares())}, "diffusivity"),
     ],
 )
