@@ -17,6 +17,7 @@ from ngswell.baths.nitsche import Nitsche
 from ngswell.baths.penalty import Penalty
 from ngswell.baths.prescribed import Essential, Frozen
 from ngswell.baths.treatment import Prescribed, Weak
+from ngswell.baths.vessel import Vessel
 from ngswell.calls import refusing
 from ngswell.errors import (
     ExtrapolationWarning,
@@ -80,7 +81,7 @@ __all__ = [
     "OverlapWarning", "Penalty", "Pin", "PlaneStrain", "Potential", "PowerLaw", "Prescribed", "Pressure", "Probe", "Problem",
     "Progress", "Ramp", "Reaction", "Reason", "Restart", "Result", "Role", "Roller", "Scene", "Setup", "Sine", "Snapshot",
     "Snapshots", "Spatial", "Spline", "Stability", "StepError", "Support", "Symmetry", "Term", "Traction",
-    "TwoLevelSolver", "Uncharged", "Weak", "Weight", "box", "by_region", "check_mesh", "column", "day", "from_occ",
+    "TwoLevelSolver", "Uncharged", "Vessel", "Weak", "Weight", "box", "by_region", "check_mesh", "column", "day", "from_occ",
     "hour", "kPa", "metre", "micrometre", "read_checkpoint", "read_mesh", "rectangle", "year",
 ]  # fmt: skip
 

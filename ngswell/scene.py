@@ -13,6 +13,7 @@ from ngswell.analysis.one_step import Growth, growth_factor
 from ngswell.baths.bath import Bath
 from ngswell.errors import InputError
 from ngswell.observers.base import Observer
+from ngswell.observers.records import power_of_mm, product
 from ngswell.problem.discretisation import Discretisation
 from ngswell.problem.problem import Problem
 from ngswell.run.checkpoint import Checkpoint
@@ -108,7 +109,9 @@ class Scene(Setup):
             lines.append(f"  {balance}: {', '.join(names)}")
         for bath in self.baths:
             carried = "; a porous plate carries its pressure" if bath.porous_plate else ""
-            lines.append(f"  bath on {bath.boundary}: {self.treatment(bath)}{carried}")
+            volume = product("-", power_of_mm(problem))
+            vessel = "" if bath.vessel is None else f"; in a vessel of {bath.vessel.volume:g} {volume}{bath.vessel}"
+            lines.append(f"  bath on {bath.boundary}: {self.treatment(bath)}{carried}{vessel}")
         lines += [f"  {name}: {law}" for name, law in self.material.laws().items()]
         lines += [f"  limit: {limit}" for limit in limits(self)]
         return "\n".join(lines)

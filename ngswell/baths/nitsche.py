@@ -69,9 +69,9 @@ class Nitsche(Weak):
         fluxes = state.transport(state.pull)._asdict()
         driven = _driven(state, contact.excess["fluid"] * normal, contact.excess["cations"] * normal)
         terms = []
-        for balance, test in contact.tests.items():
-            efflux = (InnerProduct(fluxes[balance], normal) + factor * own[balance] * contact.excess[balance]) * test
-            terms.append(contact.in_cells(balance, "efflux", efflux, Role.EFFLUX))
+        for balance in contact.tests:
+            efflux = InnerProduct(fluxes[balance], normal) + factor * own[balance] * contact.excess[balance]
+            terms.append(contact.in_cells(balance, "efflux", efflux * contact.exchange(balance), Role.EFFLUX))
             if self.adjoint != "none":
                 terms.append(contact.in_cells(balance, "adjoint", self._adjoint(contact, balance, driven), Role.ADJOINT))
         return terms

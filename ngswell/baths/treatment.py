@@ -7,7 +7,7 @@ weakly, as an efflux that the excess over equilibrium decides, or prescribes val
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any, ClassVar, Protocol, runtime_checkable
 
@@ -120,7 +120,8 @@ class Contact:
     `excess` are the unknowns less their equilibrium with the bath, by the balance that gets the efflux: p − p_D and c − c_D
     in `Concentration`, P − P̄ and c̃ − c̄ in `Potential`. `tests` and `multipliers` (trial, test) belong to the same balances.
     `h` is the mean size of the boundary's cells normal to it [mm], `order` that of the displacement; `conductances` are
-    K/h [mm³/(N s)] and D₊/h [mm/s] with the largest values of these parameters: sizes, before any law.
+    K/h [mm³/(N s)] and D₊/h [mm/s] with the largest values of these parameters: sizes, before any law. `receiving` are the
+    test functions of the balances of a bath of finite volume, which gains what the gel loses; none for other baths.
     """
 
     boundary: str
@@ -131,6 +132,7 @@ class Contact:
     h: float
     order: int
     conductances: dict[str, float]
+    receiving: dict[str, CoefficientFunction] = field(default_factory=dict)
 
     @property
     def stretch(self) -> CoefficientFunction:
@@ -144,10 +146,15 @@ class Contact:
         domains of the mesh needs. That costs the elimination of what is inside cells.
         """
         if not in_cells:
-            power = flux * self.tests[balance] * self.stretch
+            power = flux * self.exchange(balance) * self.stretch
             return Term(balance, "efflux", power, role=Role.EFFLUX, boundary=self.boundary)
         stretch = Norm(self.state.cofactor * self.state.kinematics.normal)
-        return self.in_cells(balance, "efflux", flux * self.tests[balance] * stretch, Role.EFFLUX)
+        return self.in_cells(balance, "efflux", flux * self.exchange(balance) * stretch, Role.EFFLUX)
+
+    def exchange(self, balance: str) -> CoefficientFunction:
+        """What an efflux is tested with: the gel loses it, and a bath of finite volume gains it."""
+        test = self.tests[balance]
+        return test - self.receiving[balance] if balance in self.receiving else test
 
     def effluxes(self, fluid: Field, cations: Field, in_cells: bool = False) -> list[Term]:
         """Effluxes that are so many times the excess: `fluid` [mm³/(N s)], `cations` [mm/s]; `in_cells` as in `efflux`."""

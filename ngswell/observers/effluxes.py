@@ -15,15 +15,22 @@ class Effluxes:
     """Flows of the body to the nodes on baths, and the vertices that count with each bath.
 
     Contents fall by what flows off inside and by what leaves; the flows inside are those of all terms but storage and
-    effluxes. A vertex that two baths share counts with the first.
+    effluxes. A vertex that two baths share counts with the first. The contents of a vessel's bath fall by what is let out
+    and by what goes into the gel, which is an efflux too: `vessels` are its two unknowns, by balance and boundary.
     """
 
     def __init__(self, problem: Problem) -> None:
         self._problem, self._vector = problem, problem.fields.vec.CreateVector()
+        self.vessels = {
+            (name, bath.boundary): problem.ranges[number.name].start
+            for bath in problem.setup.baths
+            for name, number in bath.numbers(problem.concentration).items()
+        }
+        balances = {*problem.model.balanced, *problem.numbers}
         inner = [
             term
             for term in problem.terms
-            if term.balance in problem.model.balanced and term.kind is not Kind.RATE and term.role is not Role.EFFLUX
+            if term.balance in balances and term.kind is not Kind.RATE and term.role is not Role.EFFLUX
         ]
         self._flows = form(problem, inner)
         self.vertices: dict[str, NDArray] = {}

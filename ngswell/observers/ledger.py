@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -27,12 +27,15 @@ class Ledger(Recorder):
 
     Attributes, one entry a time: `time` [s], `fluid` [mm², in 1-d mm, in 3-d mm³] and, where the model has
     ions, `cations` [mol/l times that];
-    `fluid_left`, `cations_left` by boundary, cumulative. With `to`, a path or a `CSV`, records go to that file.
+    `fluid_left`, `cations_left` by boundary, cumulative. Of baths in vessels, by boundary: `bath_fluid` and
+    `bath_cations` that they hold, their concentration `bath_c` [mol/l], and what was let in less what was let out,
+    `fluid_fed` and `cations_fed`. With `to`, a path or a `CSV`, records go to that file.
     """
 
     def __init__(self, to: str | Path | CSV | None = None) -> None:
         super().__init__(to=to)
         self._left: dict[tuple[str, str], float] = {}  # so far
+        self._fed: dict[tuple[str, str], float] = {}
         self._balances: tuple[str, ...] = ()
 
     def prepare(self, problem: Problem, begin: float, until: float) -> None:
@@ -40,6 +43,7 @@ class Ledger(Recorder):
         self._vertices = {name: slice(r.start, r.start + problem.mesh.nv) for name, r in problem.ranges.items()}
         self._effluxes, self._balances = Effluxes(problem), tuple(problem.model.balanced)
         self._left = dict.fromkeys(self._effluxes.nodes, 0.0)
+        self._fed = dict.fromkeys(self._effluxes.vessels, 0.0)
         self._contents = self._effluxes.sums(self._effluxes.contents())
 
     def unit(self, name: str) -> str:
@@ -48,7 +52,11 @@ class Ledger(Recorder):
     def row(self, problem: Problem) -> Mapping[str, Any]:
         held = self._effluxes.contents()
         whole = {name: held[self._vertices[unknown]].sum() for name, unknown in problem.model.balanced.items()}
-        return whole | {_left_through(boundary, name): amount for (name, boundary), amount in self._left.items()}
+        whole |= {_left_through(boundary, name): amount for (name, boundary), amount in self._left.items()}
+        for (name, boundary), dof in self._effluxes.vessels.items():
+            whole[_in_bath(boundary, name)] = held[dof]
+            whole[_fed_to(boundary, name)] = self._fed[name, boundary]
+        return whole
 
     def observe(self, problem: Problem, step: Step) -> None:
         effluxes = self._effluxes
@@ -58,18 +66,23 @@ class Ledger(Recorder):
         end = problem.snapshot(step.time)
         for weight, time, values in step.stages:
             problem.restore(Snapshot(time, values))
-            for key, flow in effluxes.sums(effluxes.flows()).items():
+            flows = effluxes.flows()
+            for key, flow in effluxes.sums(flows).items():
                 gone[key] -= weight * flow
+            for key, dof in effluxes.vessels.items():
+                self._fed[key] -= weight * float(flows[dof])
         problem.restore(end)
         for key, amount in gone.items():
             self._left[key] += amount
         super().observe(problem, step)
 
     def state(self) -> Tree:
-        return {**super().state(), "left": np.array(list(self._left.values()))}
+        so_far = {"left": np.array(list(self._left.values())), "fed": np.array(list(self._fed.values()))}
+        return {**super().state(), **so_far}
 
     def restore(self, state: Tree) -> None:
         self._left = dict(zip(self._effluxes.nodes, state["left"].tolist(), strict=True))
+        self._fed = dict(zip(self._effluxes.vessels, state["fed"].tolist(), strict=True))
 
     @property
     def fluid(self) -> NDArray:
@@ -87,14 +100,40 @@ class Ledger(Recorder):
     def cations_left(self) -> dict[str, NDArray]:
         return self._left_of("cations")
 
+    @property
+    def bath_fluid(self) -> dict[str, NDArray]:
+        return self._of_vessels(_in_bath, "fluid")
+
+    @property
+    def bath_cations(self) -> dict[str, NDArray]:
+        return self._of_vessels(_in_bath, "cations")
+
+    @property
+    def bath_c(self) -> dict[str, NDArray]:
+        fluid = self.bath_fluid
+        return {boundary: cations / fluid[boundary] for boundary, cations in self.bath_cations.items()}
+
+    @property
+    def fluid_fed(self) -> dict[str, NDArray]:
+        return self._of_vessels(_fed_to, "fluid")
+
+    @property
+    def cations_fed(self) -> dict[str, NDArray]:
+        return self._of_vessels(_fed_to, "cations")
+
     def _left_of(self, name: str) -> dict[str, NDArray]:
         columns = self._table.columns()
         return {boundary: columns[_left_through(boundary, name)] for kind, boundary in self._left if kind == name}
 
+    def _of_vessels(self, column: Callable[[str, str], str], name: str) -> dict[str, NDArray]:
+        columns = self._table.columns()
+        return {boundary: columns[column(boundary, name)] for kind, boundary in self._fed if kind == name}
+
     def imbalance(self) -> dict[str, float]:
         """Largest |held − held₀ + left| over the run, of "fluid" and "cations", relative to the largest held.
 
-        Of a balance that holds nothing, relative to the largest that left; 0 where nothing did.
+        Of a balance that holds nothing, relative to the largest that left; 0 where nothing did. Of a bath in a vessel also
+        |held − held₀ − left − fed|, relative to the largest that gel or bath held: together they close.
         """
         result, columns = {}, self._table.columns()
         for name in self._balances:
@@ -102,8 +141,20 @@ class Ledger(Recorder):
             gone = sum(self._left_of(name).values(), np.zeros_like(held))
             scale = np.abs(held).max() or np.abs(gone).max() or 1.0
             result[name] = float(np.abs(held - held[0] + gone).max() / scale)
+            left, fed = self._left_of(name), self._of_vessels(_fed_to, name)
+            for boundary, there in self._of_vessels(_in_bath, name).items():
+                lack = np.abs(there - there[0] - left[boundary] - fed[boundary]).max()
+                result[name] = max(result[name], float(lack / max(scale, np.abs(there).max())))
         return result
 
 
 def _left_through(boundary: str, name: str) -> str:
     return f"{name} left through {boundary}"
+
+
+def _in_bath(boundary: str, name: str) -> str:
+    return f"{name} in the bath on {boundary}"
+
+
+def _fed_to(boundary: str, name: str) -> str:
+    return f"{name} fed to the bath on {boundary}"

@@ -6,7 +6,7 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
-from ngsolve import CF, CoefficientFunction, x, y, z
+from ngsolve import CF, CoefficientFunction, GridFunction, x, y, z
 from numpy.typing import NDArray
 
 from ngswell.errors import Reason
@@ -35,13 +35,19 @@ SQUEEZED = 0.25
 class Admissible:
     """Bounds of a state: those of every iterate, and those of a solution only."""
 
-    def __init__(self, discretisation: Discretisation, state: Any) -> None:
-        self._discretisation, self._state = discretisation, state
+    def __init__(self, discretisation: Discretisation, state: Any, fields: GridFunction) -> None:
+        self._discretisation, self._state, self._fields = discretisation, state, fields
 
     @cached_property
     def always(self) -> dict[str, CoefficientFunction]:
         """At the forms' own points, where laws are evaluated."""
-        return _compiled({CONTENT: self._state.content}) | self.of_ions
+        return _compiled({CONTENT: self._state.content}) | self.of_ions | self._numbers
+
+    @cached_property
+    def _numbers(self) -> dict[str, CoefficientFunction]:
+        """Those that pieces of the setup bring."""
+        numbers, names = self._discretisation.numbers, self._discretisation.names
+        return {name: self._fields.components[names.index(name)] for name, n in numbers.items() if n.positive}
 
     def least_content(self) -> float:
         """The smallest J − nS0 at the watched points [-]."""

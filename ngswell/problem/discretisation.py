@@ -6,13 +6,14 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from ngsolve import BND, CF, H1, VOL, BitArray, Compress, FESpace, GridFunction
+from ngsolve import BND, CF, H1, VOL, BitArray, Compress, FESpace, GridFunction, NumberSpace
 from numpy.typing import NDArray
 
 from ngswell import checks
 from ngswell.errors import InputError, place
 from ngswell.mesh.points import points, vertices
 from ngswell.models.model import BathFields, FieldContext
+from ngswell.models.one_number import OneNumber
 from ngswell.problem.lumping import Storage
 from ngswell.setup.setup import Setup
 from ngswell.setup.snapshot import Snapshot
@@ -43,9 +44,17 @@ class Discretisation:
             traces = Compress(H1(self.mesh, order=self.model.order - 1, definedon=self.mesh.Boundaries(with_multipliers)))
             self.space = FESpace([*self.space.components, *(traces for _ in self.model.balanced)])
             self.names += tuple(f"efflux of {balance}" for balance in self.model.balanced)
+        self.numbers: dict[str, OneNumber] = {number.name: number for number in self._bring_numbers()}
+        if self.numbers:
+            self.space = FESpace([*self.space.components, *(NumberSpace(self.mesh) for _ in self.numbers)])
+            self.names += tuple(self.numbers)
         spans = [self.space.Range(i) for i in range(len(self.names))]
         self.ranges = {name: slice(span.start, span.stop) for name, span in zip(self.names, spans, strict=True)}
         self.free = self._free_dofs()
+
+    def _bring_numbers(self) -> list[OneNumber]:
+        """The unknowns that pieces of the setup bring: the seam for those of others."""
+        return [number for bath in self.setup.baths for number in bath.numbers(self.concentration).values()]
 
     def _free_dofs(self) -> BitArray:
         free = BitArray(self.space.FreeDofs())
@@ -71,6 +80,17 @@ class Discretisation:
         return self.setup.material.largest("cfc0", self.mesh) * max(map(abs, self.setup.charge.values))
 
     @cached_property
+    def concentration(self) -> float:
+        """The largest concentration that the setup itself sets [mol/l]."""
+        return max([self.largest_charge, *(value for bath in self.setup.baths for value in bath.concentrations)])
+
+    @cached_property
+    def evolving(self) -> dict[str, float]:
+        """Unknowns whose time error is controlled, see `Model.evolving`."""
+        shares = {name: number.evolves for name, number in self.numbers.items() if number.evolves is not None}
+        return dict(self.model.evolving) | shares
+
+    @cached_property
     def round_off(self) -> dict[str, float]:
         """What round-off leaves undetermined of unknowns, in their units."""
         return self.model.round_off(self.largest_charge, self.setup.material.RT)
@@ -81,11 +101,10 @@ class Discretisation:
         setup = self.setup
         corners = vertices(self.mesh)
         length = float(np.linalg.norm(corners.max(axis=0) - corners.min(axis=0)))
-        charge = self.largest_charge
-        salts = [value for bath in setup.baths if bath.salt for value in bath.salt.values]
-        own = self.model.references(max([charge, *salts]), setup.material.largest("mu", self.mesh), length)
-        multipliers = self.names[len(own) :]  # in the units of p and c
-        return own | {name: own[unknown] for name, unknown in zip(multipliers, self.model.balanced.values(), strict=False)}
+        own = self.model.references(self.concentration, setup.material.largest("mu", self.mesh), length)
+        multipliers = self.names[len(own) : len(self.names) - len(self.numbers)]  # in the units of p and c
+        own |= {name: own[unknown] for name, unknown in zip(multipliers, self.model.balanced.values(), strict=False)}
+        return own | {name: number.size for name, number in self.numbers.items()}
 
     @cached_property
     def sizes(self) -> NDArray:

@@ -3,27 +3,25 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from ngsolve import CF, BaseMatrix, BaseVector, BilinearForm, CoefficientFunction, GridFunction, Parameter
 from numpy.typing import NDArray
 
-from ngswell.baths.treatment import Charge, Contact
+from ngswell.baths.treatment import Charge
 from ngswell.mesh.points import corners
 from ngswell.models.model import BathFields, FieldContext
+from ngswell.models.one_number import Functions
 from ngswell.models.term import Kind, Term
 from ngswell.problem.admissible import Admissible
+from ngswell.problem.baths import Baths
 from ngswell.problem.bounded import set_bounded
 from ngswell.problem.discretisation import Discretisation
-from ngswell.problem.forms import cell_size, form
+from ngswell.problem.forms import form
 from ngswell.problem.prescribed import PrescribedValues
 from ngswell.schedules import Clock
 from ngswell.setup.setup import Setup
 from ngswell.setup.snapshot import Snapshot
-
-CONDUCTANCES = {"fluid": "K", "cations": "D_plus"}
-"""The parameter that lets through what each balance is about."""
 
 LEFT = 0.1
 """What a correction leaves at least of what has to be positive at a vertex."""
@@ -45,50 +43,31 @@ class Problem(Discretisation):
         self.dt = Parameter(1.0)
         self.clock = Clock(setup.start)
         self._charge = Parameter(setup.charge.at(setup.start))
-        self.baths = {
-            bath.boundary: BathFields(
-                None if bath.salt is None else self.clock.follow(bath.salt), self.clock.follow(bath.hydraulic)
-            )
-            for bath in setup.baths
+        own = len(self.model.unknowns)  # the rest are multipliers and numbers
+        trials, tests = (list(functions) for functions in self.space.TnT())
+        numbers = {
+            name: Functions(trials[at], tests[at], self.fields.components[at])
+            for at, name in enumerate(self.names)
+            if name in self.numbers
         }
+        baths = Baths(self, numbers, self.clock)
+        self.baths = baths.present
         """The baths at the clock's time, by boundary."""
         first = next(iter(self.baths.values()), None)
         context = FieldContext(setup.material, self.kinematics, self._charge, setup.fluid_weight, first)
-        own = len(self.model.unknowns)  # the rest are multipliers
-        trials, tests = (list(functions) for functions in self.space.TnT())
         trial_state = self.model.state(trials[:own], context)
         self.state = self.model.state(self.fields.components[:own], context)
         self.terms: list[Term] = [
             *self.model.terms(trial_state, tests[:own]),
-            *self._bath_terms(trial_state, trials, tests),
+            *baths.terms(trial_state, trials, tests),
             *(term for load in setup.loads for term in load.terms(trial_state, tests[0], self.clock)),
-            *self._bath_loads(trial_state.u, tests[0]),
+            *baths.loads(trial_state.u, tests[0]),
         ]
-        self.admissible = Admissible(self, self.state)
+        self.admissible = Admissible(self, self.state, self.fields)
         self._prescribed = PrescribedValues(self, self.fields, self.baths)
         self._system = form(self, self.terms, 1 / self.dt)
         self._contents = form(self, [term for term in self.terms if term.kind is Kind.RATE])
         self._old_contents, self._work = (self.fields.vec.CreateVector() for _ in range(2))
-
-    def _bath_terms(self, state: Any, trials: list, tests: list) -> list[Term]:
-        """What weak treatments add."""
-        own = len(self.model.unknowns)
-        tested = {balance: tests[self.names.index(unknown)] for balance, unknown in self.model.balanced.items()}
-        pairs = list(zip(trials[own:], tests[own:], strict=True))
-        terms: list[Term] = []
-        for bath, treatment in self.setup.weak_baths:
-            multipliers = dict(zip(self.model.balanced, pairs, strict=True)) if treatment.multipliers else {}
-            excess = self.model.excess(state, self.baths[bath.boundary])
-            h = cell_size(self.mesh, bath.boundary)
-            sizes = {name: self.setup.material.largest(CONDUCTANCES[name], self.mesh) / h for name in excess}
-            order = self.model.order
-            terms += treatment.terms(Contact(bath.boundary, state, excess, tested, multipliers, h, order, sizes))
-        return terms
-
-    def _bath_loads(self, u: Any, v: Any) -> list[Term]:
-        """What baths press with."""
-        baths = self.setup.baths
-        return [term for bath in baths for term in bath.loads(self.kinematics, u, v, self.baths[bath.boundary])]
 
     # -- clock and states ----------------------------------------------------------------------------------------------
 
@@ -121,6 +100,8 @@ class Problem(Discretisation):
         for name, value in values.items():
             field = self.fields.components[self.names.index(name)]
             field.Set(value) if uniform else set_bounded(field, value)
+        for name, number in self.numbers.items():
+            self.vector[self.ranges[name]] = number.start
         self._prescribed.remember(Charge.START)
         self.initial = self.vector.copy()
 

@@ -64,6 +64,12 @@ def equilibrate(
     time = setup.start if time is None else checks.number("equilibrate: time", time, "s", -LARGEST, LARGEST)
     if not setup.baths:
         raise InputError("equilibrate: the body is sealed, so its content at rest is not determined; give it a bath")
+    for bath in setup.baths:
+        if bath.vessel is not None:
+            raise InputError(
+                f"equilibrate: the bath on {bath.boundary!r} is in a vessel, and what it ends with is what it started with "
+                "and gained on the way: run until it rests"
+            )
     for bath, treatment in setup.prescribed_baths:
         if treatment.charge_of is not Charge.PRESENT:
             raise InputError(f"equilibrate: the bath on {bath.boundary!r} remembers the past ({treatment})")

@@ -188,7 +188,7 @@ class Setup:
 
     def treatment(self, bath: Bath) -> Treatment:
         """How equilibrium with `bath` is imposed: as it says, or by the model's default."""
-        return default_treatment(self.model) if bath.treatment is None else bath.treatment
+        return default_treatment(self.model, bath.vessel is not None) if bath.treatment is None else bath.treatment
 
     @property
     def weak_baths(self) -> list[tuple[Bath, Weak]]:
@@ -233,9 +233,9 @@ class Setup:
             raise InputError("the scene has no bath: give initial=(concentration, hydraulic pressure)")
         first = self.baths[0]
         for bath in self.baths[1:]:
-            if [s.at(self.start) for s in bath.schedules] != [s.at(self.start) for s in first.schedules]:
+            if bath.at(self.start) != first.at(self.start):
                 raise InputError(
                     f"baths on {first.boundary!r} and {bath.boundary!r} differ at the start: "
                     "give initial=(concentration, hydraulic pressure)"
                 )
-        return (first.salt.at(self.start) if first.salt else None), first.hydraulic.at(self.start)
+        return first.at(self.start)

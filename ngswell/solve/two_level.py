@@ -152,7 +152,7 @@ def _patches(problem: Problem) -> list[list[int]]:
 
 
 def _coarse_levels(problem: Problem) -> tuple[BitArray, BitArray]:
-    """Free degrees of freedom of first order, and with them those of facets."""
+    """Free degrees of freedom of first order and numbers, and with them those of facets."""
 
     def of(dofs: Iterable[int]) -> BitArray:
         chosen = BitArray(problem.space.ndof)
@@ -163,6 +163,7 @@ def _coarse_levels(problem: Problem) -> tuple[BitArray, BitArray]:
         return chosen
 
     dofs_of, mesh = problem.space.GetDofNrs, problem.mesh
-    vertices = of(dof for vertex in mesh.vertices for dof in dofs_of(vertex))
+    numbers = [problem.ranges[name].start for name in problem.numbers]
+    vertices = of([*numbers, *(dof for vertex in mesh.vertices for dof in dofs_of(vertex))])
     with_facets = vertices | of(dof for facet in mesh.facets for dof in dofs_of(facet))
     return vertices, with_facets if with_facets.NumSet() > vertices.NumSet() else problem.free

@@ -61,7 +61,7 @@ class Attempts:
         problem.dt.Set(1.0)  # to the last digit, R depends on the step that is divided out
         problem.outflow(self._work[0])
         slope = np.zeros(problem.vector.size)
-        for name in problem.model.balanced.values():
+        for name in (*problem.model.balanced.values(), *problem.numbers):
             slope[problem.ranges[name]] = self._work[0].FV().NumPy()[problem.ranges[name]]
         return slope
 

@@ -54,21 +54,21 @@ class Sizes:
     def shares(self) -> dict[str, float]:
         """By unknown, the size over the natural size, at most 1; unknowns that do not evolve follow the displacement."""
         problem = self.problem
-        evolving = dict(zip(problem.model.evolving, self._sizes(), strict=True))
+        evolving = dict(zip(problem.evolving, self._sizes(), strict=True))
         known = {name: min(1.0, float(size) / problem.references[name]) for name, size in evolving.items()}
         return {name: known.get(name, known[problem.names[0]]) for name in problem.names}
 
     def _sizes(self, *more: NDArray) -> NDArray:
-        references = np.array([self.problem.references[name] for name in self.problem.model.evolving])
+        references = np.array([self.problem.references[name] for name in self.problem.evolving])
         own = np.maximum.reduce([self._passed, self._expected, *more]) / references
         return np.maximum(own, max(ROUND_OFF, COUPLED * own[0])) * references
 
     def _natural(self) -> NDArray:
-        return np.array([share * self.problem.references[name] for name, share in self.problem.model.evolving.items()])
+        return np.array([share * self.problem.references[name] for name, share in self.problem.evolving.items()])
 
     def _changes(self, values: NDArray) -> NDArray:
         return self._rms(values - self._begin)
 
     def _rms(self, values: NDArray) -> NDArray:
-        parts = (values[self.problem.ranges[name]] for name in self.problem.model.evolving)
+        parts = (values[self.problem.ranges[name]] for name in self.problem.evolving)
         return np.array([np.sqrt(np.mean(part * part)) for part in parts])
