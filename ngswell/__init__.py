@@ -29,6 +29,7 @@ from ngswell.errors import (
     OverlapWarning,
     Reason,
     StepError,
+    UnitsWarning,
 )
 from ngswell.histories import Sine, Spline
 from ngswell.mesh.gmsh import read_mesh
@@ -78,11 +79,12 @@ __all__ = [
     "ExtrapolationWarning", "Fixed", "Frozen", "HolmesMow", "InnerLayer", "InputError", "InstabilityError",
     "InstabilityWarning", "Integral", "Lagged", "LeastSquares", "Ledger", "Load", "LocalDonnan", "MPa", "MackieMeares",
     "Material", "Multiplier", "NeoHookean", "NgswellError", "Nitsche", "Observer", "Outflow", "OutputError",
-    "OverlapWarning", "Penalty", "Pin", "PlaneStrain", "Potential", "PowerLaw", "Prescribed", "Pressure", "Probe", "Problem",
-    "Progress", "Ramp", "Reaction", "Reason", "Restart", "Result", "Role", "Roller", "Scene", "Setup", "Sine", "Snapshot",
-    "Snapshots", "Spatial", "Spline", "Stability", "StepError", "Support", "Symmetry", "Term", "Traction",
-    "TwoLevelSolver", "Uncharged", "Vessel", "Weak", "Weight", "box", "by_region", "check_mesh", "column", "day", "from_occ",
-    "hour", "kPa", "metre", "micrometre", "read_checkpoint", "read_mesh", "rectangle", "year",
+    "OverlapWarning", "Penalty", "Pin", "PlaneStrain", "Potential", "PowerLaw", "Prescribed", "Pressure", "Probe",
+    "Problem", "Progress", "Ramp", "Reaction", "Reason", "Restart", "Result", "Role", "Roller", "Scene", "Setup", "Sine",
+    "Snapshot", "Snapshots", "Spatial", "Spline", "Stability", "StepError", "Support", "Symmetry", "Term", "Traction",
+    "TwoLevelSolver", "Uncharged", "UnitsWarning", "Vessel", "Weak", "Weight", "box", "by_region", "check_mesh",
+    "column", "day", "from_occ", "hour", "kPa", "metre", "micrometre", "read_checkpoint", "read_mesh", "rectangle",
+    "year",
 ]  # fmt: skip
 
 for _name in __all__:

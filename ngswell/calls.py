@@ -8,20 +8,20 @@ import warnings
 from collections.abc import Callable
 from difflib import get_close_matches
 from functools import wraps
-from pathlib import Path
 from typing import Any, TypeVar
 
 from ngswell.errors import InputError
 
 Thing = TypeVar("Thing")
 
-_HERE = str(Path(__file__).parent)
+_PACKAGE = __name__.partition(".")[0]
 
 
 def warn(warning: Warning) -> None:
     """Warn at the line outside the package from which it was called."""
     frame, level = sys._getframe(1), 2
-    while frame.f_back is not None and frame.f_code.co_filename.startswith(_HERE):
+    # By module, not by file: the constructor of a dataclass has none.
+    while frame.f_back is not None and frame.f_globals.get("__name__", "").partition(".")[0] == _PACKAGE:
         frame, level = frame.f_back, level + 1
     warnings.warn(warning, stacklevel=level)
 

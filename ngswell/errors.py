@@ -28,6 +28,10 @@ class ExtrapolationWarning(UserWarning):
     """An output is asked for at a corner of a cell where the fields overshoot: J − nS0 is not positive there."""
 
 
+class UnitsWarning(UserWarning):
+    """Numbers of a scene, each possible, hardly belong together: one of them may be in other units."""
+
+
 class InstabilityWarning(UserWarning):
     """A run or a state of rest is past the limit of stability: perturbations grow that the numbers do not show."""
 

@@ -28,6 +28,7 @@ from ngswell.setup.loads import Load
 from ngswell.setup.rigid_motions import check_determined
 from ngswell.setup.snapshot import Snapshot
 from ngswell.setup.supports import Support
+from ngswell.setup.units import check_units
 
 SMALL_JUMP = 0.1
 """Jump of cfc0, as a share of its largest value, below which `Concentration` is off by less than 1e-4."""
@@ -83,6 +84,8 @@ class Setup:
         for load in self.loads:
             load.check_in(self)
         self.initial_bath()  # refuses baths that differ at the start
+        if self.origin is None:
+            check_units(self.mesh, self.material)
         checks.set_fields(self, _made_with=self._values())
 
     # -- checks --------------------------------------------------------------------------------------------------------

@@ -51,6 +51,7 @@ from ngswell import (
     StepError,
     Traction,
     Uncharged,
+    UnitsWarning,
     column,
     rectangle,
 )
@@ -238,6 +239,7 @@ def run(trial: Trial) -> str:
     watch, ledger = Watch(), Ledger()
     with warnings.catch_warnings(), in_time(LONGEST):
         warnings.simplefilter("error", RuntimeWarning)
+        warnings.simplefilter("ignore", UnitsWarning)  # wild numbers are meant
         try:
             scene = Scene(**trial.scene)
             newton = DampedNewton() if trial.exact else None

@@ -1,5 +1,6 @@
 """Coupled transport of fluid and ions against closed forms (`closed_forms.linear_column`, docs/linear_column.md)."""
 
+import warnings
 from dataclasses import replace
 from functools import cached_property
 
@@ -26,6 +27,7 @@ from ngswell import (
     Roller,
     Scene,
     Traction,
+    UnitsWarning,
     column,
 )
 from ngswell.closed_forms.homogeneous import homogeneous_equilibrium
@@ -432,19 +434,21 @@ def steady_fluxes(material, bath, salt=0.0, hydraulic=0.0):
     """Steady fluxes of fluid and cations away from the top's bath; the baths differ by `salt` and `hydraulic`, half each."""
     load = donnan.pressure(bath, float(material.cfc0), material.RT)
     weak = Penalty(relative=1e6)
-    scene = Scene(
-        mesh=column(THICKNESS, GEL_CELLS),
-        kinematics=Confined(),
-        material=material,
-        model=Concentration(),
-        supports=[Roller("bottom", "x")],
-        baths=[
-            Bath("top", c=bath + salt / 2, P=hydraulic / 2, treatment=weak, porous_plate=True),
-            Bath("bottom", c=bath - salt / 2, P=-hydraulic / 2, treatment=weak),
-        ],
-        loads=[Traction("top", (-load,))],
-        initial=(bath, 0.0),
-    )
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UnitsWarning)  # a rigid gel is meant
+        scene = Scene(
+            mesh=column(THICKNESS, GEL_CELLS),
+            kinematics=Confined(),
+            material=material,
+            model=Concentration(),
+            supports=[Roller("bottom", "x")],
+            baths=[
+                Bath("top", c=bath + salt / 2, P=hydraulic / 2, treatment=weak, porous_plate=True),
+                Bath("bottom", c=bath - salt / 2, P=-hydraulic / 2, treatment=weak),
+            ],
+            loads=[Traction("top", (-load,))],
+            initial=(bath, 0.0),
+        )
     ledger, dt = Ledger(), 1e4
     scene.run(8 * dt, Fixed(dt), [ledger], EXACT)  # rate × Δt > 50 a step: (1/50)⁸ is left
     left = [(ledger.fluid_left[side], ledger.cations_left[side]) for side in ("top", "bottom")]
