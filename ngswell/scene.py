@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pickle
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -84,12 +84,13 @@ class Scene(Setup):
         What the new scene does, checkpoints and observers included, begins there.
 
         Raises InputError for a snapshot of another mesh, model or order, for a history that is over before the part begins
-        or that stays although its clock changes, and for a support where the body has moved already.
+        or that stays although its clock changes, and for a support that holds the body elsewhere than it
+        is.
         """
         given = {"baths": baths, "loads": loads, "supports": supports, "charge": charge}
         snapshot = end.end if isinstance(end, Result) else end
         scene = following(self, snapshot, start, {name: piece for name, piece in given.items() if piece is not None})
-        Discretisation(scene).check("after", snapshot)
+        Discretisation(scene).check("after", replace(snapshot, time=scene.start))
         return scene
 
     def describe(self) -> str:

@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 
 from ngswell import checks
 from ngswell.errors import InputError, place
-from ngswell.mesh.points import points, vertices
+from ngswell.mesh.points import points, vertices, vertices_of
 from ngswell.models.model import BathFields, FieldContext
 from ngswell.models.one_number import OneNumber
 from ngswell.problem.lumping import Storage
+from ngswell.schedules import Schedule
 from ngswell.setup.setup import Setup
 from ngswell.setup.snapshot import Snapshot
 
@@ -23,7 +24,7 @@ BONUS_ORDER = 2
 
 
 ROUND_OFF = 1e-12
-"""What a held displacement may be, in units of its reference, and count as none."""
+"""What a held displacement may be off by, in units of its reference, and count as held."""
 
 
 class Discretisation:
@@ -139,7 +140,7 @@ class Discretisation:
         }
 
     def check(self, what: str, snapshot: Snapshot) -> None:
-        """Refuse a snapshot whose values mean something else here, or displace what this scene holds."""
+        """Refuse a snapshot whose values mean something else here, or are elsewhere than this scene holds the body."""
         checks.instance(what, snapshot, Snapshot, "a snapshot, such as `result.end`")
         if snapshot.meaning and snapshot.meaning != self.meaning:
             name = next(name for name, mine in self.meaning.items() if snapshot.meaning.get(name) != mine)
@@ -149,19 +150,45 @@ class Discretisation:
             )
         if snapshot.values.shape != (self.space.ndof,):
             raise InputError(f"{what}: the snapshot has {snapshot.values.size} unknowns, the scene {self.space.ndof}")
-        displaced = np.abs(snapshot.values[self._held])
-        if displaced.size and not displaced.max() <= ROUND_OFF * self.references[self.names[0]]:
-            worst = int(np.argmax(np.where(np.isfinite(displaced), displaced, np.inf)))
-            where = self._place(int(self._held[worst]))
+        shall = self.displaced_at(snapshot.time)[self._held]
+        off = np.abs(snapshot.values[self._held] - shall)
+        if off.size and not off.max() <= ROUND_OFF * self.references[self.names[0]]:
+            worst = int(np.argmax(np.where(np.isfinite(off), off, np.inf)))
+            where, is_at = self._place(int(self._held[worst])), snapshot.values[self._held][worst]
             raise InputError(
-                f"{what}: the snapshot displaces the body by {displaced[worst]:.3g} mm near {place(where)} mm, where a "
-                "support of the scene holds it; a support can hold only what has not moved there"
+                f"{what}: the snapshot displaces the body by {is_at:.10g} mm near {place(where)} mm, where a support of the "
+                f"scene holds it at {shall[worst]:.10g} mm; a support can hold only what is there already: give "
+                "the Roller that displacement"
             )
 
     @cached_property
+    def displaced(self) -> list[tuple[NDArray, Schedule]]:
+        """Coefficients of the displacement that follow histories: those of vertices. The others there vanish."""
+        per_component = self.space.components[0].ndof // len(self.kinematics.directions)
+        return [
+            (axis * per_component + np.array(sorted(vertices_of(self.mesh, one.boundary))), one.history)
+            for axis, direction in enumerate(self.kinematics.directions)
+            for one in self.setup.held()
+            if one.moves and one.direction == direction
+        ]
+
+    def displaced_at(self, time: float) -> NDArray:
+        """Coefficients of the displacement on supports at `time` [s], 0 elsewhere."""
+        values = np.zeros(self.ranges[self.names[0]].stop)
+        for dofs, history in self.displaced:
+            values[dofs] = history.at(time)
+        return values
+
+    @cached_property
     def _held(self) -> NDArray:
-        """Numbers of the displacement's coefficients that supports hold at zero."""
+        """Numbers of the displacement's coefficients that supports hold."""
         return np.flatnonzero(~np.array(list(self.free))[: self.ranges[self.names[0]].stop])
+
+    @cached_property
+    def _still(self) -> NDArray:
+        """Numbers of those that they hold at zero."""
+        moved = [dofs for dofs, _ in self.displaced]
+        return np.setdiff1d(self._held, np.concatenate(moved)) if moved else self._held
 
     def _place(self, dof: int) -> tuple[float, ...]:
         """About where [mm] a displacement's coefficient acts: its vertex, or the middle of its element."""

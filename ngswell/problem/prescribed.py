@@ -1,4 +1,4 @@
-"""The boundary values that baths prescribe."""
+"""The boundary values that baths and moving supports prescribe."""
 
 from __future__ import annotations
 
@@ -17,7 +17,8 @@ from ngswell.problem.discretisation import Discretisation
 
 
 class PrescribedValues:
-    """Degrees of freedom on baths and the values they shall have, as treatments give them for a step or stage.
+    """Degrees of freedom on baths and the values they shall have, as treatments give them for a step or stage; displacements
+    of supports at that time.
 
     Where two baths meet, the one that stands first in the scene prescribes. `fields` are those of the problem, `baths` the
     baths in the forms, by boundary.
@@ -38,9 +39,9 @@ class PrescribedValues:
         if of in self._charges:
             self._charges[of].vec.data = self._charge_field.vec
 
-    def update(self) -> None:
-        """Take the values that hold at the present time of the baths."""
-        self._pairs = []
+    def update(self, time: float) -> None:
+        """Take the values that hold at `time` [s], that of the baths."""
+        self._pairs = [(dofs, np.full(dofs.size, history.at(time))) for dofs, history in self._discretisation.displaced]
         for bath, treatment in self._treated:
             on = PrescribedBoundary(
                 self._boundaries[bath.boundary], self._charges.get(treatment.charge_of), self._equilibrium(bath.boundary)

@@ -169,10 +169,10 @@ class Problem(Discretisation):
     def _begin(self, time: float, dt: float, guess: NDArray | None, charge_share: float = 1.0) -> None:
         self.dt.Set(dt)
         self.set_time(time, charge_share)
-        self._prescribed.update()
+        self._prescribed.update(time)
         if guess is not None:
             self.vector[:] = guess
-            self.vector[self._held] = 0.0  # no correction sees it, and extrapolation would let round-off grow
+            self.vector[self._still] = 0.0  # no correction sees it, and extrapolation would let round-off grow
 
     def keep_positive(self, start: NDArray) -> None:
         """Where a vertex has lost all of an unknown that is positive, a part of its value at `start`, or of round-off's.

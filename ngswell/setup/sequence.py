@@ -30,7 +30,7 @@ def following(setup: Following, end: Snapshot, start: float | None, changed: Map
         initial=(salt, hydraulic) if known and setup.initial is None else setup.initial,
         **changed,
     )
-    for name in ("charge", "baths", "loads"):
+    for name in ("charge", "baths", "loads", "supports"):
         for history in _histories(result, name):
             if name in changed:
                 _check_ahead(name, history, at)

@@ -24,6 +24,7 @@ from ngswell.models.potential import Potential
 from ngswell.physics.kinematics import Kinematics
 from ngswell.physics.material import Material
 from ngswell.schedules import LARGEST, Ramp, Schedule
+from ngswell.setup.displacements import Held, by_direction, check_displacements, held
 from ngswell.setup.loads import Load
 from ngswell.setup.rigid_motions import check_determined
 from ngswell.setup.snapshot import Snapshot
@@ -78,7 +79,9 @@ class Setup:
         self._check_baths()
         for support in self.supports:
             support.check_in(self)
-        self.kinematics.check(self.mesh, self.fixed())
+        check_displacements(self.supports, self, self.start if self.origin is None else None)
+        still = (one for one in self.held() if not one.moves)
+        self.kinematics.check(self.mesh, by_direction(self.kinematics.directions, still))
         wet = {number for bath in self.baths for number in vertices_of(self.mesh, bath.boundary)}
         check_determined(self.mesh, self.sides.parts, self.kinematics, self.fixed(), self.pins(), wet)
         for load in self.loads:
@@ -177,13 +180,13 @@ class Setup:
 
     # -- what models, pieces and problems ask --------------------------------------------------------------------------
 
+    def held(self) -> list[Held]:
+        """Directions that supports hold on boundaries, and how these move, in the order of the scene."""
+        return list(held(self.supports, self))
+
     def fixed(self) -> dict[str, str]:
-        """Boundaries ("a|b") on which each displacement component vanishes."""
-        boundaries: dict[str, list[str]] = {direction: [] for direction in self.kinematics.directions}
-        for support in self.supports:
-            for direction, boundary in support.fixed(self).items():
-                boundaries[direction].append(boundary)
-        return {direction: "|".join(names) for direction, names in boundaries.items()}
+        """Boundaries ("a|b") on which each displacement component is held."""
+        return by_direction(self.kinematics.directions, self.held())
 
     def pins(self) -> list[tuple[int, str]]:
         """Vertices at which a displacement component vanishes, with its direction."""
@@ -223,8 +226,9 @@ class Setup:
     @property
     def schedules(self) -> list[Schedule]:
         """All histories of the setup."""
-        of_baths = (history for bath in self.baths for history in bath.schedules)
-        return [self.charge, *of_baths, *(history for load in self.loads for history in load.schedules)]
+        of_supports = (history for support in self.supports for history in support.schedules)
+        of_loads = (history for load in self.loads for history in load.schedules)
+        return [self.charge, *(history for bath in self.baths for history in bath.schedules), *of_loads, *of_supports]
 
     def initial_bath(self) -> tuple[CoefficientFunction | float | None, CoefficientFunction | float]:
         """Salt concentration [mol/l] and hydraulic pressure [N/mm²] that the initial state is in equilibrium with."""

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
+from dataclasses import dataclass, field
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from ngsolve import specialcf
@@ -12,21 +12,30 @@ from ngswell import checks
 from ngswell.baths.treatment import Surroundings
 from ngswell.errors import InputError
 from ngswell.mesh.points import points, vertices
+from ngswell.schedules import Schedule, schedule
 
 
 @runtime_checkable
 class Support(Protocol):
-    """Displacements that vanish. A support of one's own derives from this and gives, numbered:
+    """Displacements that are held. A support of one's own derives from this and gives, numbered:
 
     1. `check_in`: its refusals;
-    2. `fixed`: boundaries on which components of the displacement vanish;
-    3. `pins`: vertices at which they do.
+    2. `fixed`: boundaries on which it holds components of the displacement;
+    3. `displacements`: the histories of those that move there; the others vanish;
+    4. `pins`: vertices at which components vanish;
+    5. `schedules`: the histories that it follows, if any.
     """
+
+    schedules: tuple[Schedule, ...] = ()
 
     def check_in(self, surroundings: Surroundings) -> None: ...
 
     def fixed(self, surroundings: Surroundings) -> dict[str, str]:
         """Boundaries ("a|b") by direction."""
+        return {}
+
+    def displacements(self, surroundings: Surroundings) -> dict[str, Schedule]:
+        """Histories [mm] by direction, of the displacement on the boundaries of `fixed`: one number there at each time."""
         return {}
 
     def pins(self, surroundings: Surroundings) -> list[tuple[int, str]]:
@@ -36,16 +45,37 @@ class Support(Protocol):
 
 @dataclass(frozen=True)
 class Roller(Support):
-    """The displacement in `direction` ("x", "y"; "xy" for both) vanishes on a boundary.
+    """The displacement in `direction` ("x", "y"; "xy" for both) is held on a boundary: at zero, or as `displacement` says.
 
-    Like every boundary it is sealed unless it has a bath."""
+        Roller("top", "y", Ramp((0, 0.0), (600, -0.1)))  # frictionless
+        Roller("top", "xy", (0.0, Ramp((0, 0.0), (600, -0.1))))  # glued
+
+    `displacement` [mm] is a number or a history, for several directions one each. A body that starts undeformed has to start
+    with none. Like every boundary it is sealed unless it has a bath. Raises InputError for displacements that vary in space,
+    are longer than ten times the body, or contradict another support.
+    """
 
     boundary: str
     direction: str
+    displacement: float | Schedule | tuple[float | Schedule, ...] = 0.0
+    schedules: tuple[Schedule, ...] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         checks.name("Roller: boundary", self.boundary, "left|right")
         checks.name("Roller: direction", self.direction, "x")
+        entries: Any = checks.as_tuple(self.displacement)
+        if entries is None:
+            still = checks.is_number(self.displacement) and self.displacement == 0
+            entries = (self.displacement,) * (len(self.direction) if still else 1)
+        histories = tuple(schedule("Roller: displacement [mm]", entry) for entry in entries)
+        if len(histories) != len(self.direction):
+            raise InputError(
+                f"Roller: displacement in {self.direction!r} has to be {len(self.direction)} numbers or histories, one a "
+                f"direction, got {checks.short(self.displacement)}"
+            )
+        if not all(history.uniform for history in histories):
+            raise InputError("Roller: displacement varies in space; it has to be one number or history for a boundary")
+        checks.set_fields(self, schedules=histories)
 
     def check_in(self, surroundings: Surroundings) -> None:
         surroundings.check_boundary("Roller", self.boundary)
@@ -53,6 +83,9 @@ class Roller(Support):
 
     def fixed(self, surroundings: Surroundings) -> dict[str, str]:
         return dict.fromkeys(self.direction, self.boundary)
+
+    def displacements(self, surroundings: Surroundings) -> dict[str, Schedule]:
+        return dict(zip(self.direction, self.schedules, strict=True))
 
 
 @dataclass(frozen=True)
@@ -118,3 +151,5 @@ def _check_directions(what: str, directions: str, surroundings: Surroundings) ->
     known = surroundings.kinematics.directions
     if any(direction not in known for direction in directions):
         raise InputError(f"{what}: direction {directions!r} is none of {', '.join(known)} (or several of them)")
+    if len(set(directions)) < len(directions):
+        raise InputError(f"{what}: direction {directions!r} names one twice")

@@ -169,7 +169,7 @@ PIECES = {
     LeastSquares: [st.integers(0, 6), st.tuples(st.floats(0, 10), st.floats(1, 10))],
     PowerLaw: [st.floats(0, 50)],
     HolmesMow: [st.floats(0, 50), st.floats(0, 50)],
-    Roller: [NAMES, st.sampled_from(["x", "y", "xy"])],
+    Roller: [NAMES, st.sampled_from(["x", "y"]), st.one_of(PLACES, RAMPS, st.tuples(RAMPS))],
     Symmetry: [NAMES],
     Pin: [st.tuples(PLACES, PLACES), st.sampled_from(["x", "xy"])],
     Traction: [NAMES, st.tuples(PLACES, st.one_of(PLACES, RAMPS))],

@@ -27,6 +27,7 @@ from ngswell import (
     Ramp,
     Roller,
     Scene,
+    Symmetry,
     Snapshots,
     Traction,
     Weight,
@@ -53,7 +54,7 @@ def scene(**changes):
 
 
 MISTAKES = {
-    "a displacement where rollers have none": (lambda: Roller("top", "y", -0.1), "Roller: .* it takes boundary, direction"),
+    "a displacement where symmetries have none": (lambda: Symmetry("top", -0.1), "Symmetry: .* it takes boundary"),
     "a misspelt parameter": (lambda: Material(mu=1, lamda=1), "no argument 'lamda'; 'lam' may be meant"),
     "the same in a copy": (lambda: replace(TABLE_1, lamda=2), "no argument 'lamda'; 'lam' may be meant"),
     "parameters without names": (lambda: Material(0.2, 0.1), "by name: mu, lam"),
