@@ -30,6 +30,10 @@ STRAIGHT = 1e-9
 """A point off that line by at most this share lies on it: round-off of decimal times and values, and below any tolerance."""
 
 
+CLOSEST = 1e-100
+"""Times [s] that differ by no more are one time: slopes between them would be infinite."""
+
+
 @dataclass(frozen=True)
 class Signal:
     """A schedule in the forms: `field` enters them, `set(t)` moves it to time t [s]."""
@@ -196,7 +200,7 @@ def through(what: str, points: tuple[tuple[float, float], ...]) -> tuple[tuple[f
             raise InputError(f"{what} takes points (time, value), {what}((0, 1.0), (60, 2.0)), got {checks.short(pair)}")
     times, values = (tuple(column) for column in zip(*pairs, strict=True))
     for before, after in pairwise(times):
-        if after <= before:
+        if not after - before > CLOSEST:
             raise InputError(f"{what} times have to increase, but {after:g} s follows {before:g} s")
     return times, values
 

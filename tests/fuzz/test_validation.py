@@ -147,9 +147,9 @@ MESH = rectangle(1.0, 1.0, 1, 1)
 SALT = log_uniform(1e-12, 10.0)
 PLACES = st.floats(-100.0, 100.0)
 NAMES = st.sampled_from(["top", "left|right", "nowhere"])
-RAMPS = st.lists(st.tuples(st.floats(-1e6, 1e6), SALT), min_size=1, max_size=4, unique_by=lambda point: point[0]).map(
-    lambda points: Ramp(*sorted(points))
-)
+RAMPS = st.lists(
+    st.tuples(st.floats(-1e6, 1e6), SALT), min_size=1, max_size=4, unique_by=lambda point: round(point[0], 9)
+).map(lambda points: Ramp(*sorted(points)))
 HISTORIES = st.one_of(SALT, RAMPS, st.builds(Blend, RAMPS, RAMPS, st.sampled_from([x, CF(0.5), 0.25])))
 TREATMENTS = st.sampled_from([None, Essential(), Penalty(relative=1e3), Nitsche(), Multiplier(), Lagged(InnerLayer())])
 SIZES = log_uniform(1e-6, 1e6)

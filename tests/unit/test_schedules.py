@@ -133,6 +133,7 @@ def test_signal_follows_the_clock():
     [
         (lambda: Ramp(), "at least one"),
         (lambda: Ramp((0, 1), (0, 2)), "increase"),
+        (lambda: Ramp((0.0, 1.0), (2e-308, 2.0)), "increase, but 2e-308 s follows 0 s"),
         (lambda: Ramp((5, 1), (4, 2)), "4 s follows 5 s"),
         (lambda: Ramp((0, math.inf)), "finite"),
         (lambda: Ramp(5), "point has to be some numbers.*got 5"),
