@@ -66,7 +66,7 @@ MISTAKES = {
     "a table as material": (lambda: scene(material={"mu": 1}), "material has to be"),
     "a number as charge": (lambda: scene(charge=1.0), "charge has to be"),
     "a bath without its boundary": (lambda: Bath(), "missing a required argument: 'boundary'"),
-    "too much of a bath": (lambda: Bath("top", 0.15, 0.0, Penalty(1), True, 4), "Bath: too many"),
+    "too much of a bath": (lambda: Bath("top", 0.15, 0.0, Penalty(1), True, None, 4), "Bath: too many"),
     "boundaries in a list": (lambda: Roller(["top"], "y"), "boundary has to be a name"),
     "no cells": (lambda: rectangle(1, 1), "missing a required argument: 'nx'"),
     "a misspelt grade": (lambda: rectangle(1, 1, 2, 2, grading={}), "'grade' may be meant"),
