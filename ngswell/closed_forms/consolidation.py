@@ -8,17 +8,15 @@ sum of modes exp(−α² T), α the roots of an equation of its own.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from math import ceil, inf, pi, sqrt
+from math import inf, pi
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ngswell.calls import refusing
-from ngswell.closed_forms.homogeneous import parameters
+from ngswell.closed_forms.modes import confined_modulus, moduli, roots, terms
 from ngswell.errors import InputError
 from ngswell.physics.material import Material
-from ngswell.physics.solid import small_strain_moduli
 
 EARLIEST = 1e-8
 """Dimensionless time below which the series are refused: they would need more than 20 000 terms."""
@@ -27,7 +25,7 @@ EARLIEST = 1e-8
 @refusing
 def consolidation_coefficient(material: Material) -> float:
     """c_v = K (2µ + λ) [mm²/s]."""
-    return material.number("K") * _confined_modulus(material)
+    return material.number("K") * confined_modulus(material)
 
 
 @refusing
@@ -47,7 +45,7 @@ def terzaghi_settlement(material: Material, load: float, height: float, time: Ar
     """Downward displacement of the column's top [mm]:  load h/M [1 − Σ (2/α²) exp(−α² T)]."""
     _, T = _scaled(material, "height", height, 0.0, time)
     alpha = _terzaghi_roots(T)
-    return load * height / _confined_modulus(material) * (1 - (2 / alpha**2 * np.exp(-(alpha**2) * T)).sum(axis=-1))
+    return load * height / confined_modulus(material) * (1 - (2 / alpha**2 * np.exp(-(alpha**2) * T)).sum(axis=-1))
 
 
 @refusing
@@ -75,7 +73,7 @@ def mandel_shortening(material: Material, load: float, half_width: float, time: 
     _, T = _scaled(material, "half_width", half_width, 0.0, time)
     alpha, amplitude = _mandel_modes(material, T)
     mean = load * (amplitude * (np.sin(alpha) / alpha - np.cos(alpha)) * np.exp(-(alpha**2) * T)).sum(axis=-1)
-    mu, lam = _moduli(material)
+    mu, lam = moduli(material)
     return (load * (2 * mu + lam) / (2 * mu) - mean) / (2 * mu + 2 * lam)
 
 
@@ -106,7 +104,7 @@ def cryer_settlement(material: Material, load: float, radius: float, time: Array
     """
     _, T = _scaled(material, "radius", radius, 0.0, time)
     alpha, denominator = _cryer_modes(material, T)
-    mu, lam = _moduli(material)
+    mu, lam = moduli(material)
     transient = (np.sin(alpha) / denominator * np.exp(-(alpha**2) * T)).sum(axis=-1) / (2 * mu)
     return load * radius * (1 / (2 * mu + 3 * lam) + transient)
 
@@ -115,41 +113,26 @@ def cryer_settlement(material: Material, load: float, radius: float, time: Array
 
 
 def _terzaghi_roots(T: NDArray) -> NDArray:
-    return (np.arange(_terms(T)) + 0.5) * pi
+    return (np.arange(terms(T)) + 0.5) * pi
 
 
 def _mandel_modes(material: Material, T: NDArray) -> tuple[NDArray, NDArray]:
     """Roots of tan α = (M/µ) α, one in each (nπ, nπ + π/2) as M/µ > 1, and sin α / (α − sin α cos α)."""
-    mu, lam = _moduli(material)
+    mu, lam = moduli(material)
     slope = (2 * mu + lam) / mu
-    low = np.arange(_terms(T)) * pi
+    low = np.arange(terms(T)) * pi
     low[0] = 1e-3  # α = 0 is no mode, and the first root is at 1.17 or above
-    alpha = _roots(lambda a: np.sin(a) - slope * a * np.cos(a), low, np.arange(low.size) * pi + pi / 2)
+    alpha = roots(lambda a: np.sin(a) - slope * a * np.cos(a), low, np.arange(low.size) * pi + pi / 2)
     return alpha, np.sin(alpha) / (alpha - np.sin(alpha) * np.cos(alpha))
 
 
 def _cryer_modes(material: Material, T: NDArray) -> tuple[NDArray, NDArray]:
     """Roots of (η − α²) tan α = η α, one in each (nπ − π/2, nπ) as η ≤ 2, and α cos α + (2 − η) sin α."""
-    mu, lam = _moduli(material)
+    mu, lam = moduli(material)
     eta = min(2.0, 4 * mu / (2 * mu + lam))  # beyond by round-off, the first bracket would hold no root
-    high = np.arange(1, _terms(T) + 1) * pi
-    alpha = _roots(lambda a: (eta - a * a) * np.sin(a) - eta * a * np.cos(a), high - pi / 2, high)
+    high = np.arange(1, terms(T) + 1) * pi
+    alpha = roots(lambda a: (eta - a * a) * np.sin(a) - eta * a * np.cos(a), high - pi / 2, high)
     return alpha, alpha * np.cos(alpha) + (2 - eta) * np.sin(alpha)
-
-
-def _roots(function: Callable[[NDArray], NDArray], low: NDArray, high: NDArray) -> NDArray:
-    """Bisection to round-off, all brackets at once."""
-    sign = np.sign(function(low))
-    for _ in range(60):
-        middle = (low + high) / 2
-        left = np.sign(function(middle)) == sign
-        low, high = np.where(left, middle, low), np.where(left, high, middle)
-    return (low + high) / 2
-
-
-def _terms(T: NDArray) -> int:
-    """Number of modes, π apart, until exp(−α² T) falls below 1e-17."""
-    return ceil(sqrt(40 / T.min()) / pi) + 1
 
 
 # -- arguments -----------------------------------------------------------------------------------------------------------
@@ -166,15 +149,3 @@ def _scaled(material: Material, name: str, length: float, position: ArrayLike, t
     if not (T >= EARLIEST).all():
         raise InputError(f"time {time!r} s: the series converge for c_v t / L² ≥ {EARLIEST:g} only; give a later time")
     return xi, T
-
-
-def _moduli(material: Material) -> tuple[float, float]:
-    """µ and λ of small strains [N/mm²]."""
-    parameters(material)
-    return small_strain_moduli(material)
-
-
-def _confined_modulus(material: Material) -> float:
-    """M = 2µ + λ, the stiffness in confined compression [N/mm²]."""
-    mu, lam = _moduli(material)
-    return 2 * mu + lam

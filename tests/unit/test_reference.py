@@ -24,7 +24,7 @@ from ngswell import (
     column,
     plotting,
 )
-from ngswell.closed_forms import consolidation, homogeneous, linear_column
+from ngswell.closed_forms import consolidation, homogeneous, linear_column, relaxation
 from ngswell.models.solid_state import OUTPUT_UNITS, SolidState
 from ngswell.stepping.schemes import BACKWARD_EULER, Scheme
 
@@ -48,7 +48,7 @@ def described():
     yield "state.at", SolidState.at
     yield "on_deformed_body", plotting.on_deformed_body
     yield "Picture.mirrored", plotting.Picture.mirrored
-    for module in (homogeneous, consolidation, linear_column):
+    for module in (homogeneous, consolidation, relaxation, linear_column):
         for name, thing in vars(module).items():
             public = inspect.isfunction(thing) and thing.__module__ == module.__name__ and not name.startswith("_")
             if public and name != "parameters":  # which closed forms share
