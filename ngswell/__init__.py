@@ -61,6 +61,7 @@ from ngswell.run.restart import Restart, read_checkpoint
 from ngswell.run.result import Result
 from ngswell.scene import Scene
 from ngswell.schedules import Blend, Ramp
+from ngswell.setup.efflux import Efflux
 from ngswell.setup.loads import Load, Pressure, Traction, Weight
 from ngswell.setup.setup import Setup
 from ngswell.setup.snapshot import Snapshot
@@ -75,7 +76,7 @@ from ngswell.version import __version__ as __version__
 
 __all__ = [
     "BACKWARD_EULER", "CSV", "ESDIRK4", "TABLE_1", "TABLE_2", "VTK", "Adaptive", "Area", "Averaged", "Axisymmetric",
-    "Bath", "Blend", "Call", "Checkpoint", "Coarseness", "Concentration", "Confined", "DampedNewton", "Essential",
+    "Bath", "Blend", "Call", "Checkpoint", "Coarseness", "Concentration", "Confined", "DampedNewton", "Efflux", "Essential",
     "ExtrapolationWarning", "Fixed", "Frozen", "HolmesMow", "InnerLayer", "InputError", "InstabilityError",
     "InstabilityWarning", "Integral", "Lagged", "LeastSquares", "Ledger", "Load", "LocalDonnan", "MPa", "MackieMeares",
     "Material", "Multiplier", "NeoHookean", "NgswellError", "Nitsche", "Observer", "Outflow", "OutputError",

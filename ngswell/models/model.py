@@ -46,7 +46,7 @@ class FieldContext:
     material: Material
     kinematics: Kinematics
     charge: Field
-    fluid_weight: tuple[float, ...] | None
+    fluid_weight: tuple[Field, ...] | None
     bath: BathFields | None
 
 

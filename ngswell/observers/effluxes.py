@@ -15,8 +15,8 @@ class Effluxes:
     """Flows of the body to the nodes on baths, and the vertices that count with each bath.
 
     Contents fall by what flows off inside and by what leaves; the flows inside are those of all terms but storage and
-    effluxes. A vertex that two baths share counts with the first. The contents of a vessel's bath fall by what is let out
-    and by what goes into the gel, which is an efflux too: `vessels` are its two unknowns, by balance and boundary.
+    effluxes to baths. A vertex that two baths share counts with the first. The contents of a vessel's bath fall by what is
+    let out and by what goes into the gel, which is an efflux too: `vessels` are its unknowns, by balance and boundary.
     """
 
     def __init__(self, problem: Problem) -> None:
@@ -26,13 +26,14 @@ class Effluxes:
             for bath in problem.setup.baths
             for name, number in bath.numbers(problem.concentration).items()
         }
-        balances = {*problem.model.balanced, *problem.numbers}
-        inner = [
-            term
-            for term in problem.terms
-            if term.balance in balances and term.kind is not Kind.RATE and term.role is not Role.EFFLUX
-        ]
-        self._flows = form(problem, inner)
+        balances, baths = {*problem.model.balanced, *problem.numbers}, {bath.boundary for bath in problem.setup.baths}
+        flows = [term for term in problem.terms if term.balance in balances and term.kind is not Kind.RATE]
+        self._flows = form(problem, [term for term in flows if term.role is not Role.EFFLUX or term.boundary not in baths])
+        given = [term for term in flows if term.role is Role.EFFLUX and term.boundary not in baths]
+        self._given = {
+            boundary: form(problem, [term for term in given if term.boundary == boundary])
+            for boundary in dict.fromkeys(str(term.boundary) for term in given)
+        }
         self.vertices: dict[str, NDArray] = {}
         taken = np.zeros(problem.mesh.nv, dtype=bool)
         for bath in problem.setup.baths:
@@ -54,6 +55,16 @@ class Effluxes:
         """What flows off inside the body in unit time, at the present fields; a view that the next call changes."""
         self._flows.Apply(self._problem.fields.vec, self._vector)
         return self._vector.FV().NumPy()
+
+    def given(self) -> dict[tuple[str, str], float]:
+        """What loads take out through their boundaries in unit time, by balance and boundary."""
+        found, vector = {}, self._problem.fields.vec.CreateVector()
+        for boundary, flux in self._given.items():
+            flux.Apply(self._problem.fields.vec, vector)
+            for name, unknown in self._problem.model.balanced.items():
+                start = self._problem.ranges[unknown].start
+                found[name, boundary] = float(vector.FV().NumPy()[start : start + self._problem.mesh.nv].sum())
+        return found
 
     def sums(self, values: NDArray) -> dict[tuple[str, str], float]:
         """Sums over the vertices of each bath, by balance and boundary."""

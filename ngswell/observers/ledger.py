@@ -22,7 +22,8 @@ class Ledger(Recorder):
     """Fluid volume and cations held, and what left through each bath by the discrete fluxes.
 
     What left is what the balances of the nodes on a bath lack: their flows from the body, over the stages of the step, less
-    the fall of their contents. A node that two baths share counts with the first. `held − held₀ + Σ left` is what the
+    the fall of their contents. A node that two baths share counts with the first. What an `Efflux`
+    takes out is counted as given, by its boundary. `held − held₀ + Σ left` is what the
     nonlinear solves left in all other nodes: the scheme itself conserves exactly.
 
     Attributes, one entry a time: `time` [s], `fluid` [mm², in 1-d mm, in 3-d mm³] and, where the model has
@@ -42,7 +43,7 @@ class Ledger(Recorder):
         self._power = power_of_mm(problem)
         self._vertices = {name: slice(r.start, r.start + problem.mesh.nv) for name, r in problem.ranges.items()}
         self._effluxes, self._balances = Effluxes(problem), tuple(problem.model.balanced)
-        self._left = dict.fromkeys(self._effluxes.nodes, 0.0)
+        self._left = dict.fromkeys((*self._effluxes.nodes, *self._effluxes.given()), 0.0)
         self._fed = dict.fromkeys(self._effluxes.vessels, 0.0)
         self._contents = self._effluxes.sums(self._effluxes.contents())
 
@@ -69,6 +70,8 @@ class Ledger(Recorder):
             flows = effluxes.flows()
             for key, flow in effluxes.sums(flows).items():
                 gone[key] -= weight * flow
+            for key, flow in effluxes.given().items():
+                self._left[key] += weight * flow
             for key, dof in effluxes.vessels.items():
                 self._fed[key] -= weight * float(flows[dof])
         problem.restore(end)
@@ -81,7 +84,7 @@ class Ledger(Recorder):
         return {**super().state(), **so_far}
 
     def restore(self, state: Tree) -> None:
-        self._left = dict(zip(self._effluxes.nodes, state["left"].tolist(), strict=True))
+        self._left = dict(zip(self._left, state["left"].tolist(), strict=True))
         self._fed = dict(zip(self._effluxes.vessels, state["fed"].tolist(), strict=True))
 
     @property

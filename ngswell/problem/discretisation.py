@@ -15,7 +15,8 @@ from ngswell.mesh.points import points, vertices, vertices_of
 from ngswell.models.model import BathFields, FieldContext
 from ngswell.models.one_number import OneNumber
 from ngswell.problem.lumping import Storage
-from ngswell.schedules import Schedule
+from ngswell.schedules import Clock, Schedule
+from ngswell.setup.loads import followed
 from ngswell.setup.setup import Setup
 from ngswell.setup.snapshot import Snapshot
 
@@ -210,7 +211,8 @@ class Discretisation:
         if setup.baths:
             first = setup.baths[0]
             bath = BathFields(None if first.salt is None else CF(first.salt.at(time)), CF(first.hydraulic.at(time)))
-        context = FieldContext(setup.material, self.kinematics, setup.charge.at(time), setup.fluid_weight, bath)
+        weight = None if setup.fluid_weight is None else followed(setup.fluid_weight, Clock(time))
+        context = FieldContext(setup.material, self.kinematics, setup.charge.at(time), weight, bath)
         return self.model.state(fields.components[: len(self.model.unknowns)], context)
 
 

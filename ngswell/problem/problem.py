@@ -20,6 +20,7 @@ from ngswell.problem.discretisation import Discretisation
 from ngswell.problem.forms import form
 from ngswell.problem.prescribed import PrescribedValues
 from ngswell.schedules import Clock
+from ngswell.setup.loads import followed
 from ngswell.setup.setup import Setup
 from ngswell.setup.snapshot import Snapshot
 
@@ -54,13 +55,16 @@ class Problem(Discretisation):
         self.baths = baths.present
         """The baths at the clock's time, by boundary."""
         first = next(iter(self.baths.values()), None)
-        context = FieldContext(setup.material, self.kinematics, self._charge, setup.fluid_weight, first)
+        weight = None if setup.fluid_weight is None else followed(setup.fluid_weight, self.clock)
+        context = FieldContext(setup.material, self.kinematics, self._charge, weight, first)
         trial_state = self.model.state(trials[:own], context)
         self.state = self.model.state(self.fields.components[:own], context)
+        tested = {balance: tests[self.names.index(unknown)] for balance, unknown in self.model.balanced.items()}
         self.terms: list[Term] = [
             *self.model.terms(trial_state, tests[:own]),
             *baths.terms(trial_state, trials, tests),
             *(term for load in setup.loads for term in load.terms(trial_state, tests[0], self.clock)),
+            *(term for load in setup.loads for term in load.flows(tested, self.clock)),
             *baths.loads(trial_state.u, tests[0]),
         ]
         self.admissible = Admissible(self, self.state, self.fields)

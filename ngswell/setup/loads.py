@@ -27,11 +27,12 @@ class Load(Protocol):
     1. `check_in`: its refusals;
     2. `terms`: its terms of the momentum balance, with `Role.LOAD`;
     3. `schedules`: the histories that it follows, if any; `clock.follow(history)` makes the field that a term takes;
-    4. `fluid_weight`: a body force on the fluid [N/mm³], which also drives seepage, if it has one.
+    4. `fluid_weight`: a body force on the fluid [N/mm³], which also drives seepage, if it has one: numbers or histories;
+    5. `flows`: its terms of the other balances, if it has any, with `Role.EFFLUX` what leaves through a boundary.
     """
 
     schedules: tuple[Schedule, ...] = ()
-    fluid_weight: tuple[float, ...] | None = None
+    fluid_weight: tuple[float | Schedule, ...] | None = None
 
     def check_in(self, surroundings: Surroundings) -> None: ...
 
@@ -43,29 +44,33 @@ class Load(Protocol):
         """
         ...
 
+    def flows(self, tests: dict[str, CoefficientFunction], clock: Clock) -> list[Term]:
+        """Terms tested with the test function of each balance, "fluid" and where the model has ions "cations"."""
+        return []
+
 
 @dataclass(frozen=True)
 class Traction(Load):
     """Traction on a boundary [N/mm²], per area and in the direction of the reference configuration, eq. (36).
 
     Each component of `vector` is a number or a history, `(0.0, Ramp((0, 0.0), (60, -0.02)))`; a `Blend` varies in space.
-    Raises InputError for values beyond ±1e3 and in directions in which a support holds the boundary.
+    An `effective` traction is what the solid alone bears: the pore pressure p at the boundary, osmotic pressure included,
+    adds its −p n per current area. Raises InputError for values beyond ±1e3, in directions in which a support holds the
+    boundary, and for an effective traction where a bath presses as well.
     """
 
     boundary: str
     vector: tuple[float | Schedule, ...]
+    effective: bool = field(default=False, kw_only=True)
 
     def __post_init__(self) -> None:
         checks.name("Traction: boundary", self.boundary, "top")
-        entries = checks.as_tuple(self.vector)
-        values = self.vector if entries is None else [value for entry in entries for value in _values(entry)]
-        checks.vector("Traction", values, LARGEST_TRACTION, "N/mm²")
-        vector = (entry if checks.is_a(entry, Schedule) else checks.as_float(entry) for entry in entries or ())
-        checks.set_fields(self, vector=tuple(vector))
+        checks.set_fields(self, vector=_components("Traction", self.vector, LARGEST_TRACTION, "N/mm²"))
+        checks.flag("Traction: effective", self.effective)
 
     @property
     def schedules(self) -> tuple[Schedule, ...]:  # type: ignore[override]
-        return tuple(cast(Schedule, entry) for entry in self.vector if checks.is_a(entry, Schedule))
+        return _histories(self.vector)
 
     def check_in(self, surroundings: Surroundings) -> None:
         _check_components("Traction", self.vector, surroundings)
@@ -74,11 +79,25 @@ class Traction(Load):
             for name in names:
                 if any(_values(entry)) and name in fixed[direction].split("|"):
                     raise InputError(f"Traction on {name!r}: a support holds it in {direction}, so it has no effect")
+        for bath in surroundings.baths if self.effective else ():
+            if {*names} & {*bath.boundary.split("|")} and any(bath.hydraulic.values) and not bath.porous_plate:
+                raise InputError(
+                    f"Traction on {self.boundary!r}: it is effective, so that all of the pore pressure presses there, and "
+                    "so does the bath's P; give the bath porous_plate=True"
+                )
         check_histories(surroundings.mesh, self.boundary, self.schedules)
 
     def terms(self, state: Any, v: CoefficientFunction, clock: Clock) -> list[Term]:
-        vector = [clock.follow(cast(Schedule, e)) if checks.is_a(e, Schedule) else e for e in self.vector]
-        return [Term("momentum", "traction", -InnerProduct(CF(tuple(vector)), v), role=Role.LOAD, boundary=self.boundary)]
+        power = InnerProduct(CF(followed(self.vector, clock)), v)
+        terms = [Term("momentum", "traction", -power, role=Role.LOAD, boundary=self.boundary)]
+        if self.effective:
+            area = state.cofactor * state.kinematics.normal  # all of it in the cells beside: osmotic pressure depends on J
+            along = CF(tuple(area[i] for i in range(len(self.vector))))
+            pressed = state.pore_pressure * InnerProduct(along, v)
+            terms.append(
+                Term("momentum", "pore pressure", pressed, role=Role.LOAD, boundary=self.boundary, normal_derivatives=True)
+            )
+        return terms
 
 
 @dataclass(frozen=True)
@@ -120,18 +139,23 @@ class Pressure(Load):
 class Weight(Load):
     """Body force ρ b of (16) from the specific weights of solid and fluid substance [N/mm³]; water has 1e-5.
 
-    The fluid's weight also drives seepage, as in (19). `fluid` and `solid` are vectors, such as (0, -1e-5).
+    The fluid's weight also drives seepage, as in (19). `fluid` and `solid` are vectors, such as (0, -1e-5), whose components
+    are numbers or histories; in a centrifuge a `Blend` of none and the largest grows with the radius.
     """
 
-    fluid: tuple[float, ...]
-    solid: tuple[float, ...]
+    fluid: tuple[float | Schedule, ...]
+    solid: tuple[float | Schedule, ...]
 
     def __post_init__(self) -> None:
         for name in ("fluid", "solid"):
-            checks.set_fields(self, **{name: checks.vector(f"Weight: {name}", getattr(self, name), 1.0, "N/mm³")})
+            checks.set_fields(self, **{name: _components(f"Weight: {name}", getattr(self, name), 1.0, "N/mm³")})
 
     @property
-    def fluid_weight(self) -> tuple[float, ...]:  # type: ignore[override]
+    def schedules(self) -> tuple[Schedule, ...]:  # type: ignore[override]
+        return _histories(self.fluid) + _histories(self.solid)
+
+    @property
+    def fluid_weight(self) -> tuple[float | Schedule, ...]:  # type: ignore[override]
         return self.fluid
 
     def check_in(self, surroundings: Surroundings) -> None:
@@ -139,10 +163,29 @@ class Weight(Load):
             _check_components("Weight", vector, surroundings)
         if sum(load.fluid_weight is not None for load in surroundings.loads) > 1:
             raise InputError("loads hold more than one Weight; add the vectors up")
+        for history in self.schedules:
+            history.check_on(points(surroundings.mesh))
 
     def terms(self, state: Any, v: CoefficientFunction, clock: Clock) -> list[Term]:
-        force = state.material.nS0 * CF(self.solid) + state.content * CF(self.fluid)
+        solid, fluid = (CF(followed(vector, clock)) for vector in (self.solid, self.fluid))
+        force = state.material.nS0 * solid + state.content * fluid
         return [Term("momentum", "weight", -InnerProduct(force, v), role=Role.LOAD)]
+
+
+def followed(vector: tuple[float | Schedule, ...], clock: Clock) -> tuple[float | CoefficientFunction, ...]:
+    """The components of a vector at the clock's time."""
+    return tuple(clock.follow(cast(Schedule, e)) if checks.is_a(e, Schedule) else cast(float, e) for e in vector)
+
+
+def _components(what: str, vector: Any, limit: float, unit: str) -> tuple[float | Schedule, ...]:
+    """`vector` as a tuple of numbers and histories, all within ±`limit`."""
+    entries = checks.as_tuple(vector)
+    checks.vector(what, vector if entries is None else [value for entry in entries for value in _values(entry)], limit, unit)
+    return tuple(entry if checks.is_a(entry, Schedule) else checks.as_float(entry) for entry in entries or ())
+
+
+def _histories(vector: tuple[float | Schedule, ...]) -> tuple[Schedule, ...]:
+    return tuple(cast(Schedule, entry) for entry in vector if checks.is_a(entry, Schedule))
 
 
 def _check_components(what: str, vector: tuple[float | Schedule, ...], surroundings: Surroundings) -> None:

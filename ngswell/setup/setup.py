@@ -106,7 +106,7 @@ class Setup:
             self,
             supports=checks.several("supports", self.supports, Support, "Roller, Symmetry or Pin"),
             baths=checks.several("baths", self.baths, Bath, "Bath(...)"),
-            loads=checks.several("loads", self.loads, Load, "Traction, Pressure or Weight"),
+            loads=checks.several("loads", self.loads, Load, "Traction, Pressure, Weight or Efflux"),
             start=checks.number("start", self.start, "s", -LARGEST, LARGEST),
         )
         if self.origin is not None:
@@ -219,7 +219,7 @@ class Setup:
         return digest(self.mesh)
 
     @property
-    def fluid_weight(self) -> tuple[float, ...] | None:
+    def fluid_weight(self) -> tuple[float | Schedule, ...] | None:
         """Specific weight of the fluid, which drives seepage [N/mm³]; None without."""
         return next((load.fluid_weight for load in self.loads if load.fluid_weight is not None), None)
 
