@@ -50,6 +50,7 @@ from ngswell.observers.reaction import Reaction
 from ngswell.observers.sampling import Area, Integral, Probe, Snapshots
 from ngswell.observers.stability import Stability
 from ngswell.observers.vtk import VTK
+from ngswell.physics.elastic import HolmesMowSolid, LogNeoHookean, MooneyRivlin
 from ngswell.physics.kinematics import Axisymmetric, Confined, PlaneStrain, Spatial
 from ngswell.physics.material import TABLE_1, TABLE_2, Material
 from ngswell.physics.pores import HolmesMow, MackieMeares, PowerLaw
@@ -75,17 +76,16 @@ from ngswell.units import MPa, day, hour, kPa, metre, micrometre, year
 from ngswell.version import __version__ as __version__
 
 __all__ = [
-    "BACKWARD_EULER", "CSV", "ESDIRK4", "TABLE_1", "TABLE_2", "VTK", "Adaptive", "Area", "Averaged", "Axisymmetric",
-    "Bath", "Blend", "Call", "Checkpoint", "Coarseness", "Concentration", "Confined", "DampedNewton", "Efflux", "Essential",
-    "ExtrapolationWarning", "Fixed", "Frozen", "HolmesMow", "InnerLayer", "InputError", "InstabilityError",
-    "InstabilityWarning", "Integral", "Lagged", "LeastSquares", "Ledger", "Load", "LocalDonnan", "MPa", "MackieMeares",
-    "Material", "Multiplier", "NeoHookean", "NgswellError", "Nitsche", "Observer", "Outflow", "OutputError",
-    "OverlapWarning", "Penalty", "Pin", "PlaneStrain", "Potential", "PowerLaw", "Prescribed", "Pressure", "Probe",
-    "Problem", "Progress", "Ramp", "Reaction", "Reason", "Restart", "Result", "Role", "Roller", "Scene", "Setup", "Sine",
-    "Snapshot", "Snapshots", "Spatial", "Spline", "Stability", "StepError", "Support", "Symmetry", "Term", "Traction",
-    "TwoLevelSolver", "Uncharged", "UnitsWarning", "Vessel", "Weak", "Weight", "box", "by_region", "check_mesh",
-    "column", "day", "from_occ", "hour", "kPa", "metre", "micrometre", "read_checkpoint", "read_mesh", "rectangle",
-    "year",
+    "BACKWARD_EULER", "CSV", "ESDIRK4", "TABLE_1", "TABLE_2", "VTK", "Adaptive", "Area", "Averaged", "Axisymmetric", "Bath",
+    "Blend", "Call", "Checkpoint", "Coarseness", "Concentration", "Confined", "DampedNewton", "Efflux", "Essential",
+    "ExtrapolationWarning", "Fixed", "Frozen", "HolmesMow", "HolmesMowSolid", "InnerLayer", "InputError", "InstabilityError",
+    "InstabilityWarning", "Integral", "Lagged", "LeastSquares", "Ledger", "Load", "LocalDonnan", "LogNeoHookean", "MPa",
+    "MackieMeares", "Material", "MooneyRivlin", "Multiplier", "NeoHookean", "NgswellError", "Nitsche", "Observer", "Outflow",
+    "OutputError", "OverlapWarning", "Penalty", "Pin", "PlaneStrain", "Potential", "PowerLaw", "Prescribed", "Pressure",
+    "Probe", "Problem", "Progress", "Ramp", "Reaction", "Reason", "Restart", "Result", "Role", "Roller", "Scene", "Setup",
+    "Sine", "Snapshot", "Snapshots", "Spatial", "Spline", "Stability", "StepError", "Support", "Symmetry", "Term",
+    "Traction", "TwoLevelSolver", "Uncharged", "UnitsWarning", "Vessel", "Weak", "Weight", "box", "by_region", "check_mesh",
+    "column", "day", "from_occ", "hour", "kPa", "metre", "micrometre", "read_checkpoint", "read_mesh", "rectangle", "year",
 ]  # fmt: skip
 
 for _name in __all__:

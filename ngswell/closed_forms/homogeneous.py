@@ -12,7 +12,7 @@ from ngswell.calls import refusing
 from ngswell.errors import InputError
 from ngswell.physics import donnan
 from ngswell.physics.material import Material
-from ngswell.physics.solid import homogeneous_response, small_strain_moduli
+from ngswell.physics.solid import check_alike, homogeneous_response, small_strain_moduli
 
 
 @refusing
@@ -53,24 +53,23 @@ def homogeneous_equilibrium(
 ) -> Equilibrium:
     """The state in which a homogeneous body comes to rest in a bath of `salt` [mol/l] at `hydraulic` [N/mm²].
 
-    `motion` is "confined", "plane strain" or "3-d": d = 1, 2, 3 directions free to stretch by J^(1/d). Equilibrium of the
-    extra stress with the pore pressure (38) and what presses on the deformed surface, P̄ and a `load` [N/mm²]:
+    `motion` is "confined", "plane strain" or "3-d": d = 1, 2, 3 directions free to stretch by J^(1/d). The extra stress
+    balances the pore pressure (38) and what presses on the deformed surface, P̄ and a `load` [N/mm²]:
 
         dψ/dJ = p_D(c̄, cfc) − P̄ − load,   for the paper's law (18)
         µ (J^(2/d) − 1) + λ (1 − nS0)² [J/(1 − nS0) − J/(J − nS0)] = J (p_D − P̄ − load).
 
-    P̄ adds to p and leaves J; where a porous plate carries it, give load − P̄. p_D has the material's Γ, φ and φ̄; with
-    φ Γ > φ̄ a weak gel may swell without bound. `boundary_charge` [mol/l] replaces cfc(J) in p_D: a boundary condition that
-    does not follow the deformation. Raises InputError for parameters that vary in space, and without equilibrium.
+    P̄ adds to p and leaves J; where a porous plate carries it, give load − P̄. p_D has the material's Γ, φ and φ̄.
+    `boundary_charge` [mol/l], which does not follow the deformation, replaces cfc(J) in p_D. Raises InputError for what
+    varies in space or by direction, and without equilibrium: with φ Γ > φ̄ a weak gel may swell without bound.
     """
     checks.instance("material", material, Material, "a Material(...)")
     checks.choice("motion", motion, FREE_DIRECTIONS)
-    salt = checked_salt("salt", salt)
+    salt, free = checked_salt("salt", salt), FREE_DIRECTIONS[motion]
     hydraulic, load = (checks.number(w, v, "N/mm²", -1e3, 1e3) for w, v in (("hydraulic", hydraulic), ("load", load)))
     if boundary_charge is not None:
         boundary_charge = checks.number("boundary_charge", boundary_charge, "mol/l", 0.0, 1e3)
-    nS0, cfc0 = parameters(material)
-    response = homogeneous_response(material, FREE_DIRECTIONS[motion])
+    (nS0, cfc0), response = parameters(material), homogeneous_response(material, free)
 
     # Everything follows from the fluid content J − nS0, which J itself does not tell near the compression point.
     def charge(content: float) -> float:
@@ -91,6 +90,7 @@ def homogeneous_equilibrium(
     if (content := _root(excess, SMALLEST * nS0, 1 - nS0)) is None:
         raise InputError(f"no equilibrium: the body swells without bound in a bath of {salt:g} mol/l")
     J, cfc = nS0 + content, charge(content)
+    check_alike(material, free, J)
     c = donnan.cations(salt, cfc if boundary_charge is None else boundary_charge, material.Gamma)
     return Equilibrium(J, cfc, nS0 / J, c, hydraulic + osmotic(content))
 
