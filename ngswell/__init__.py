@@ -33,7 +33,7 @@ from ngswell.errors import (
 )
 from ngswell.histories import Sine, Spline
 from ngswell.mesh.gmsh import read_mesh
-from ngswell.mesh.shapes import box, column, from_occ, rectangle
+from ngswell.mesh.shapes import box, column, from_occ, ray, rectangle
 from ngswell.mesh.soundness import check_mesh
 from ngswell.models.concentration import Concentration
 from ngswell.models.local_donnan import LocalDonnan
@@ -54,6 +54,7 @@ from ngswell.physics.elastic import HolmesMowSolid, LogNeoHookean, MooneyRivlin
 from ngswell.physics.kinematics import Axisymmetric, Confined, PlaneStrain, Spatial
 from ngswell.physics.material import TABLE_1, TABLE_2, Material
 from ngswell.physics.pores import HolmesMow, MackieMeares, PowerLaw
+from ngswell.physics.radial import Cylindrical, Spherical
 from ngswell.physics.regions import by_region
 from ngswell.physics.solid import NeoHookean
 from ngswell.problem.problem import Problem
@@ -76,16 +77,17 @@ from ngswell.units import MPa, day, hour, kPa, metre, micrometre, year
 from ngswell.version import __version__ as __version__
 
 __all__ = [
-    "BACKWARD_EULER", "CSV", "ESDIRK4", "TABLE_1", "TABLE_2", "VTK", "Adaptive", "Area", "Averaged", "Axisymmetric", "Bath",
-    "Blend", "Call", "Checkpoint", "Coarseness", "Concentration", "Confined", "DampedNewton", "Efflux", "Essential",
-    "ExtrapolationWarning", "Fixed", "Frozen", "HolmesMow", "HolmesMowSolid", "InnerLayer", "InputError", "InstabilityError",
-    "InstabilityWarning", "Integral", "Lagged", "LeastSquares", "Ledger", "Load", "LocalDonnan", "LogNeoHookean", "MPa",
-    "MackieMeares", "Material", "MooneyRivlin", "Multiplier", "NeoHookean", "NgswellError", "Nitsche", "Observer", "Outflow",
-    "OutputError", "OverlapWarning", "Penalty", "Pin", "PlaneStrain", "Potential", "PowerLaw", "Prescribed", "Pressure",
-    "Probe", "Problem", "Progress", "Ramp", "Reaction", "Reason", "Restart", "Result", "Role", "Roller", "Scene", "Setup",
-    "Sine", "Snapshot", "Snapshots", "Spatial", "Spline", "Stability", "StepError", "Support", "Symmetry", "Term",
-    "Traction", "TwoLevelSolver", "Uncharged", "UnitsWarning", "Vessel", "Weak", "Weight", "box", "by_region", "check_mesh",
-    "column", "day", "from_occ", "hour", "kPa", "metre", "micrometre", "read_checkpoint", "read_mesh", "rectangle", "year",
+    "BACKWARD_EULER", "CSV", "ESDIRK4", "TABLE_1", "TABLE_2", "VTK", "Adaptive", "Area", "Averaged", "Axisymmetric",
+    "Bath", "Blend", "Call", "Checkpoint", "Coarseness", "Concentration", "Confined", "Cylindrical", "DampedNewton",
+    "Efflux", "Essential", "ExtrapolationWarning", "Fixed", "Frozen", "HolmesMow", "HolmesMowSolid", "InnerLayer",
+    "InputError", "InstabilityError", "InstabilityWarning", "Integral", "Lagged", "LeastSquares", "Ledger", "Load",
+    "LocalDonnan", "LogNeoHookean", "MPa", "MackieMeares", "Material", "MooneyRivlin", "Multiplier", "NeoHookean",
+    "NgswellError", "Nitsche", "Observer", "Outflow", "OutputError", "OverlapWarning", "Penalty", "Pin", "PlaneStrain",
+    "Potential", "PowerLaw", "Prescribed", "Pressure", "Probe", "Problem", "Progress", "Ramp", "Reaction", "Reason",
+    "Restart", "Result", "Role", "Roller", "Scene", "Setup", "Sine", "Snapshot", "Snapshots", "Spatial", "Spherical",
+    "Spline", "Stability", "StepError", "Support", "Symmetry", "Term", "Traction", "TwoLevelSolver", "Uncharged",
+    "UnitsWarning", "Vessel", "Weak", "Weight", "box", "by_region", "check_mesh", "column", "day", "from_occ", "hour",
+    "kPa", "metre", "micrometre", "ray", "read_checkpoint", "read_mesh", "rectangle", "year",
 ]  # fmt: skip
 
 for _name in __all__:

@@ -129,6 +129,9 @@ class Bath:
         mesh, model = surroundings.mesh, surroundings.model
         surroundings.check_boundary("bath", self.boundary)
         check_histories(mesh, self.boundary, self.schedules)
+        if not area(mesh, surroundings.kinematics, self.boundary) > 0:
+            what = "vessel" if self.vessel is not None else "bath"
+            raise InputError(f"{what} on {self.boundary!r}: the boundary has no area, so the bath is connected to nothing")
         treatment = surroundings.treatment(self)
         if not treatment.suits(model):
             choices = ", ".join(type(other).__name__ for other in TREATMENTS if other.suits(model))
@@ -154,8 +157,6 @@ class Bath:
                     f"{what}: it touches the bath on {other.boundary!r}, and what leaves there would belong to both; put "
                     f"a sealed side between them, or make them one, Bath({self.boundary + '|' + other.boundary!r}, ...)"
                 )
-        if not area(mesh, surroundings.kinematics, self.boundary) > 0:
-            raise InputError(f"{what}: the boundary has no area, so the bath is connected to nothing")
 
 
 def area(mesh: Mesh, kinematics: Kinematics, boundary: str) -> float:

@@ -48,10 +48,10 @@ def corners(mesh: Mesh) -> NDArray:
 def integral_on_boundary(
     mesh: Mesh, field: CoefficientFunction, boundary: str, order: int, measure: CoefficientFunction | float = 1.0
 ) -> float:
-    """Integral over a boundary of a field of the body (and its derivatives) times `measure`; in 1-d the sum of values."""
+    """Integral over a boundary, in 1-d the sum over ends, of a field of the body (and its derivatives) times `measure`."""
     region = mesh.Boundaries(boundary)
     if mesh.dim == 1:  # NGSolve's traces of derivatives need a boundary with area
-        return sum(field(mesh(*mesh[element.vertices[0]].point)) for element in region.Elements())
+        return sum((measure * field)(mesh(*mesh[element.vertices[0]].point)) for element in region.Elements())
     return Integrate(BoundaryFromVolumeCF(field) * measure, mesh, BND, definedon=region, order=order)
 
 

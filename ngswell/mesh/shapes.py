@@ -49,6 +49,31 @@ def column(
     return with_regions("column", mesh, at, regions)
 
 
+def ray(
+    inner: float,
+    outer: float,
+    cells: int,
+    grade: Grade | None = None,
+    lines: Lines | None = None,
+    regions: Regions | None = None,
+) -> Mesh:
+    """A segment of radii from `inner`, which may be 0, to `outer` [mm], with boundaries "inner" and "outer".
+
+    For `Cylindrical` and `Spherical`. `grade={"outer": 10}` thins the cells towards a boundary, `lines={"r": 0.8}` puts mesh
+    lines at radii and `regions={"r": ["core", "shell"]}` names what lies between them, as in `column`.
+    """
+    inner = checks.number("ray: inner", inner, "mm", 0.0, SIZES[1], "radii start at the centre")
+    (outer,), (cells,) = _checked_sizes("ray", (outer,), (cells,))
+    if not outer > inner:
+        raise InputError(f"ray: outer = {outer:g} mm has to be larger than inner = {inner:g} mm")
+    at = places("ray", lines, "r")
+    (nodes,) = coordinates("ray", (outer - inner,), (cells,), (("inner", "outer"),), grade, at, "r", inner)
+    mesh = Make1DMesh(cells, mapping=lambda s: nodes[round(cells * s)])
+    for number, name in enumerate(("inner", "outer")):
+        mesh.ngmesh.SetBCName(number, name)
+    return with_regions("ray", mesh, at, regions, "r")
+
+
 def rectangle(
     width: float,
     height: float,

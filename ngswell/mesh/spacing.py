@@ -40,8 +40,10 @@ def coordinates(
     sides: tuple[tuple[str, str], ...],
     grade: Grade | None,
     lines: dict[str, list[float]],
+    axes: str = "xyz",
+    start: float = 0.0,
 ) -> list[list[float]]:
-    """Node coordinates [mm] along each axis, whose two ends are named in `sides`."""
+    """Node coordinates [mm] along each of the `axes` from `start`; their two ends are named in `sides`."""
     names = [name for pair in sides for name in pair]
     ratios = dict.fromkeys(names, 1.0)
     for name, ratio in _by_name(f"{what}: grade", grade, {names[-1]: 10.0}):
@@ -50,15 +52,15 @@ def coordinates(
             f"{what}: grade at {name!r}", ratio, low=1.0, high=1e6, hint="it is largest over smallest cell"
         )
     nodes = {
-        axis: _nodes(size, number, ratios[low], ratios[high])
-        for axis, size, number, (low, high) in zip("xyz", sizes, cells, sides, strict=False)
+        axis: _nodes(start, size, number, ratios[low], ratios[high])
+        for axis, size, number, (low, high) in zip(axes, sizes, cells, sides, strict=False)
     }
     for axis, at in lines.items():
         nodes[axis] = _through(f"{what}: lines", axis, nodes[axis], at)
     return list(nodes.values())
 
 
-def with_regions(what: str, mesh: Mesh, lines: dict[str, list[float]], regions: Regions | None) -> Mesh:
+def with_regions(what: str, mesh: Mesh, lines: dict[str, list[float]], regions: Regions | None, axes: str = "xyz") -> Mesh:
     """The mesh with the cells between `lines` in the named regions; without names as it is."""
     named = _by_name(f"{what}: regions", regions, {"x": ["core", "skin"]})
     if not named:
@@ -66,8 +68,7 @@ def with_regions(what: str, mesh: Mesh, lines: dict[str, list[float]], regions: 
     if len(named) > 1:
         raise InputError(f"{what}: regions = {checks.short(regions)}: name the regions along one axis")
     axis, names = named[0][0], checks.as_tuple(named[0][1])
-    axes = "xyz"[: mesh.dim]
-    checks.choice(f"{what}: regions: axis", axis, axes)
+    checks.choice(f"{what}: regions: axis", axis, axes[: mesh.dim])
     at = lines.get(axis, [])
     if names is None or len(names) != len(at) + 1:
         raise InputError(
@@ -105,24 +106,24 @@ def _by_name(what: str, values: Any, example: dict[str, Any]) -> list[tuple[Any,
 
 def _through(what: str, axis: str, nodes: list[float], at: list[float]) -> list[float]:
     """Nodes with those nearest to the places `at` moved there, stretched evenly between them."""
-    length, cells, moved = nodes[-1], len(nodes) - 1, [0.0, *at, nodes[-1]]
+    start, end, cells, moved = nodes[0], nodes[-1], len(nodes) - 1, [nodes[0], *at, nodes[-1]]
     if not (np.diff(moved) > 0).all() or len(at) >= cells:
         raise InputError(
             f"{what} = {{{axis!r}: {checks.short(at)}}} mm need two cells or more in {axis}, one more than lines, and "
-            f"different places between 0 and {length:g}"
+            f"different places between {start:g} and {end:g}"
         )
     number = np.abs(np.array(nodes)[:, None] - np.array(at)).argmin(axis=0)
     count = np.arange(len(at))
     number = np.maximum.accumulate(np.maximum(number, 1 + count) - count) + count  # one node for each, in their order
     number = np.minimum(number, cells - len(at) + count)
-    return np.interp(nodes, [0.0, *np.array(nodes)[number], length], moved).tolist()
+    return np.interp(nodes, [start, *np.array(nodes)[number], end], moved).tolist()
 
 
-def _nodes(length: float, cells: int, low: float, high: float) -> list[float]:
-    """Nodes of `cells` cells on [0, length], thinned `low` and `high` times at the ends, in geometric progressions."""
+def _nodes(start: float, length: float, cells: int, low: float, high: float) -> list[float]:
+    """Nodes of `cells` cells from `start` on, thinned `low` and `high` times at the ends, in geometric progressions."""
     index = np.arange(cells)
     both = low > 1 and high > 1
     reach = max(1, (cells - 1) // 2 if both else cells - 1)  # cells from an end to the largest
     thinning = log(low) * np.maximum(0, 1 - index / reach) + log(high) * np.maximum(0, 1 - (cells - 1 - index) / reach)
     nodes = np.concatenate([[0.0], np.cumsum(np.exp(-thinning))])
-    return [*(length * nodes[:-1] / nodes[-1]), length]
+    return [*(start + length * nodes[:-1] / nodes[-1]), start + length]

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
-from ngsolve import CoefficientFunction, Cof, Det, Id, InnerProduct, Inv, Mesh
+from ngsolve import BoundaryFromVolumeCF, CoefficientFunction, Cof, Det, Id, InnerProduct, Inv, Mesh, Norm
 
 from ngswell import checks
 from ngswell.calls import refusing, warn
@@ -61,6 +61,13 @@ class SolidState:
     def pull(self) -> CoefficientFunction:
         """J F⁻¹ F⁻ᵀ [-], which takes reference gradients to fluxes per reference area."""
         return self.cofactor.trans * self.cofactor / self.J
+
+    @property
+    def stretch_on_boundary(self) -> CoefficientFunction:
+        """da/dA on a boundary [-], of a result. The ends of a 1-d mesh have no derivatives, and need none."""
+        if self.kinematics.dimension == 1:
+            return self.kinematics.area_stretch(self.u)
+        return Norm(BoundaryFromVolumeCF(self.cofactor) * self.kinematics.normal)
 
     @cached_property
     def push(self) -> CoefficientFunction:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from ngsolve import BilinearForm, BoundaryFromVolumeCF, CoefficientFunction, GridFunction, Mesh, Norm, ds
+from ngsolve import BilinearForm, GridFunction, Mesh, ds
 from numpy.typing import NDArray
 
 from ngswell import checks
@@ -114,11 +114,8 @@ class _Trace:
         self._offset = problem.ranges[unknown].start
         self._field = GridFunction(space)
         self._where = [self._point(mesh, point, boundary) for point in points]
-        stretch: CoefficientFunction | float = 1.0
-        if mesh.dim > 1:
-            stretch = Norm(BoundaryFromVolumeCF(problem.state.cofactor) * problem.kinematics.normal)
         q, test = space.TnT()
-        integrand = problem.kinematics.weight * stretch * q * test
+        integrand = problem.kinematics.weight * problem.state.stretch_on_boundary * q * test
         self._mass = BilinearForm(space)
         self._mass += integrand * ds(definedon=region, bonus_intorder=BONUS_ORDER)
 

@@ -32,9 +32,10 @@ class Reaction(Recorder):
     in each direction, with the one whose support stands first in the scene; a pinned vertex counts with the first held
     boundary that it is on, and with none if it is on none.
 
-    `values` has one row a time: N/mm² in a column, N per mm of thickness in plane strain, N in space, and N on the whole
-    circumference, 2π, when axisymmetric; along r that is the sum of the radial forces. At a start out of balance it is that
-    of the fields as they are. With `to`, a path or a `CSV`, records go to that file. Raises InputError for a boundary on
+    `values` has one row a time: N/mm² in a column, N per mm of thickness in plane strain or length of a cylinder, N in
+    space, and N on the whole circumference, 2π, when axisymmetric; along r that is the sum of the radial forces. At a
+    start out of balance it is that of the fields as they are. With `to`, a path or a `CSV`, records go to that file.
+    Raises InputError for a boundary on
     which nothing is held.
     """
 

@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ngswell import checks
 from ngswell.files import Tree
 from ngswell.observers.base import Observer
 from ngswell.problem.problem import Problem
@@ -87,8 +86,8 @@ class Table:
 
 
 def power_of_mm(problem: Problem) -> int:
-    """Of the unit of the body's volume: 1 in 1-d, 2 in the plane, 3 in space and where the weight of the measure is 2πr."""
-    return problem.mesh.dim + (not checks.is_number(problem.kinematics.weight))
+    """Of the unit of the body's volume: 1 in a column, 2 in the plane and per millimetre of a cylinder, 3 otherwise."""
+    return problem.kinematics.power
 
 
 def product(unit: str, power: int) -> str:

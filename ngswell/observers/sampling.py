@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from ngsolve import CF, BoundaryFromVolumeCF, Integrate, Norm
+from ngsolve import CF, Integrate
 from numpy.typing import NDArray
 
 from ngswell import checks
@@ -106,8 +106,7 @@ class Integral(Recorder):
             self._density = (quantity * problem.state.J * weight).Compile()
         else:
             problem.setup.check_boundary("Integral", self.boundary)
-            cofactor = BoundaryFromVolumeCF(problem.state.cofactor)
-            self._quantity, self._measure = quantity, Norm(cofactor * problem.kinematics.normal) * weight
+            self._quantity, self._measure = quantity, problem.state.stretch_on_boundary * weight
 
     def unit(self, name: str) -> str:
         return self._unit

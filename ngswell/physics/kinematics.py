@@ -21,16 +21,16 @@ class Kinematics(Protocol):
     Tensors are as large as the motion needs: 1 × 1 confined, 2 × 2 in plane strain, 3 × 3 otherwise; `in_space` makes a
     deformation gradient whole. A motion of one's own gives, numbered:
 
-    1. `dimension` of its meshes, `directions`, and `check`, its refusals;
+    1. `dimension` of its meshes, `directions`, `power`, and `check`, its refusals;
     2. `space`, `gradient`: the displacement and its gradient;
     3. `flow_gradient`, `flow_vector`: gradients of pressures and vectors of the scene, as long as its tensors are wide;
     4. `in_space`: F as 3 × 3;
-    5. `weight`, `normal`, `area_vector`, `area_stretch`: measures of the body and its boundary;
-    6. `rigid_motions`: what supports have to hold.
+    5. `weight`, `normal`, `area_vector`, `area_stretch`: measures of the body and its boundary; `rigid_motions`.
     """
 
     dimension: int
     directions: str
+    power: int  # of mm, in the unit of the body's volume
 
     def check(self, mesh: Mesh, fixed: dict[str, str]) -> None:
         """Refuse meshes on which the kinematics has no meaning; `fixed` maps directions to boundaries ("a|b")."""
@@ -83,7 +83,7 @@ class Kinematics(Protocol):
 class Confined:
     """One displacement component on a 1-d mesh: a column between frictionless walls, F = 1 + u′ = J."""
 
-    dimension = 1
+    dimension = power = 1
     directions = "x"
     weight = 1.0
 
@@ -157,7 +157,7 @@ class _Cartesian:
 class PlaneStrain(_Cartesian):
     """Two displacement components on a 2-d mesh; no stretch and no flow out of the plane."""
 
-    dimension = 2
+    dimension = power = 2
     directions = "xy"
 
     def in_space(self, F: CoefficientFunction) -> CoefficientFunction:
@@ -172,7 +172,7 @@ class PlaneStrain(_Cartesian):
 class Spatial(_Cartesian):
     """Three displacement components on a 3-d mesh."""
 
-    dimension = 3
+    dimension = power = 3
     directions = "xyz"
 
     def in_space(self, F: CoefficientFunction) -> CoefficientFunction:
@@ -190,7 +190,7 @@ class Axisymmetric:
     On the axis u_r/r is the limit ∂u_r/∂r, and u_r has to vanish there.
     """
 
-    dimension = 2
+    dimension, power = 2, 3
     directions = "rz"
 
     def check(self, mesh: Mesh, fixed: dict[str, str]) -> None:

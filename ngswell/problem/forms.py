@@ -6,7 +6,7 @@ from typing import Any
 
 from ngsolve import CF, VOL, BilinearForm, Integrate, Mesh, Variation, ds, dx
 
-from ngswell.models.term import Kind, Term
+from ngswell.models.term import Kind, Role, Term
 from ngswell.problem.discretisation import BONUS_ORDER, Discretisation
 from ngswell.problem.lumping import VERTEX_RULES
 
@@ -17,7 +17,9 @@ def integral(discretisation: Discretisation, term: Term, factor: Any = None) -> 
     integrand = ((weight if factor is None else factor * weight) * term.integrand).Compile()
     if term.boundary is not None:
         region = discretisation.mesh.Boundaries(term.boundary)
-        return integrand * ds(definedon=region, bonus_intorder=BONUS_ORDER, skeleton=term.normal_derivatives)
+        # At the ends of a 1-d mesh NGSolve's normal points outwards as seen from the cell only.
+        in_cells = term.normal_derivatives or (discretisation.mesh.dim == 1 and term.role is Role.LOAD)
+        return integrand * ds(definedon=region, bonus_intorder=BONUS_ORDER, skeleton=in_cells)
     over_body = integrand * dx(bonus_intorder=BONUS_ORDER)
     return Variation(over_body) if term.kind is Kind.ENERGY else over_body
 

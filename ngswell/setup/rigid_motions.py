@@ -51,6 +51,8 @@ def check_determined(
 def free_motion(kinematics: Kinematics, places: NDArray, fixed: list[tuple[int, int]]) -> str | None:
     """A rigid motion of a body with vertices at `places` that `fixed`, pairs (vertex, axis), leaves free; else None."""
     motions = rigid_motions(kinematics, places)
+    if not motions.size:
+        return None
     rows = np.array([motions[vertex, axis] for vertex, axis in fixed]).reshape(-1, motions.shape[2])
     _, sizes, modes = np.linalg.svd(rows)
     if int((sizes > 1e-9).sum()) == motions.shape[2]:

@@ -96,7 +96,7 @@ class Setup:
     def _check_kinds(self) -> None:
         """Refuse pieces that are none of their kind; lists become tuples."""
         checks.instance("mesh", self.mesh, Mesh, "a mesh of NGSolve, as column, rectangle, box, from_occ and read_mesh make")
-        motions = "Confined(), PlaneStrain(), Axisymmetric() or Spatial()"
+        motions = "Confined(), Cylindrical(), Spherical(), PlaneStrain(), Axisymmetric() or Spatial()"
         checks.instance("kinematics", self.kinematics, Kinematics, motions)
         checks.instance("material", self.material, Material, "a Material(...)")
         models = "Potential(), Concentration(), LocalDonnan() or Uncharged()"

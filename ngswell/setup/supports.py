@@ -111,6 +111,8 @@ class Symmetry(Support):
     def _normal(self, surroundings: Surroundings) -> str:
         """The direction of the plane's normal."""
         mesh = surroundings.mesh
+        if mesh.dim == 1:  # an end has no points
+            return surroundings.kinematics.directions
         normals = np.abs(specialcf.normal(mesh.dim)(points(mesh, mesh.Boundaries(self.boundary), 2)))
         axis = int(np.argmax(normals[0]))
         if normals[:, axis].min() < 1 - 1e-9:

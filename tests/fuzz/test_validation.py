@@ -62,6 +62,7 @@ from ngswell import (
     Weight,
     box,
     column,
+    ray,
     rectangle,
 )
 from ngswell.closed_forms.homogeneous import homogeneous_equilibrium
@@ -196,12 +197,13 @@ PIECES = {
     Reaction: [NAMES, WHEN],
     VTK: [st.sampled_from(["nowhere/series", "series"]), st.sampled_from(["J", "p"])],
     column: [SIZES, CELLS, st.sampled_from([None, {"top": 10.0}])],
+    ray: [st.one_of(st.just(0.0), st.floats(1e-9, 1e-7)), SIZES, CELLS, st.sampled_from([None, {"outer": 10.0}])],
     rectangle: [SIZES, SIZES, CELLS, CELLS, st.booleans(), st.sampled_from([None, {"top": 10.0}])],
     box: [SIZES, SIZES, SIZES, CELLS, CELLS, CELLS, st.sampled_from(["hexahedra", "prisms"])],
 }
 """Makers of pieces and good arguments for each, in order."""
 
-COUNTS = {column: (1,), rectangle: (2, 3), box: (3, 4, 5)}
+COUNTS = {column: (1,), ray: (2,), rectangle: (2, 3), box: (3, 4, 5)}
 """Arguments that are numbers of cells: what would take hours and all memory to mesh is not tried."""
 
 

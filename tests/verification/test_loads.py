@@ -25,11 +25,13 @@ from ngswell import (
     Spatial,
     Symmetry,
     Traction,
+    Uncharged,
     box,
     column,
     rectangle,
 )
 from ngswell.closed_forms.homogeneous import homogeneous_equilibrium
+from tests.scenes import WITHOUT_IONS
 
 LOAD = 0.05  # N/mm²
 
@@ -123,6 +125,26 @@ def test_a_pressure_comes_to_the_closed_form(motion):
         found = scene.state(scene.equilibrate(time)).at(middle, "J")
         # homogeneous: exact in the space, Newton's method to round-off
         assert found == pytest.approx(homogeneous_equilibrium(TABLE_2, 0.3, closed, load=load).J, rel=1e-10)
+
+
+@pytest.mark.parametrize("load", ["pressure", "bath"])
+def test_a_column_may_be_pressed_at_either_end(load):
+    """The normal points outwards at both ends, and Newton's matrix has it: as many iterations."""
+    ends = []
+    for wet, held in (("top", "bottom"), ("bottom", "top")):
+        bath = Bath(wet, P=0.01 if load == "bath" else 0.0)
+        scene = Scene(
+            mesh=column(0.5, 4), kinematics=Confined(), material=WITHOUT_IONS, model=Uncharged(),
+            supports=[Roller(held, "x")], baths=[bath], initial=(None, 0.0),
+            loads=[Pressure(wet, 0.05)] if load == "pressure" else [],
+        )  # fmt: skip
+        result = scene.run(100.0, Fixed(20.0))
+        J = [result.state.at((place,), "J") for place in (0.1, 0.4)]
+        ends.append((J if wet == "top" else J[::-1], [step.iterations for step in result.steps]))
+    assert ends[0][0] == pytest.approx(ends[1][0], rel=1e-9)
+    assert ends[0][1] == ends[1][1]
+    moved = abs(ends[0][0][1] - 1)  # near the wet end
+    assert moved > 1e-3 if load == "pressure" else moved < 1e-9  # a bath squeezes no incompressible constituents
 
 
 def test_a_pressure_is_what_a_bath_presses_with():
