@@ -36,6 +36,18 @@ def imbalance(problem: Problem) -> Failure | None:
     return Failure(Reason.LOADED_AT_ONCE if loaded else Reason.OUT_OF_BALANCE, "u", where, said)
 
 
+def released(problem: Problem, snapshot: Snapshot) -> Failure | None:
+    """What is said of forces that did not balance at the scene's start, where nothing but the body has moved since then."""
+    setup = problem.setup
+    for history in setup.schedules:
+        if not history.uniform or history.at(setup.start) != history.at(snapshot.time):
+            return None
+    problem.restore(Snapshot(setup.start, problem.initial))
+    found = imbalance(problem)
+    problem.restore(snapshot)
+    return found
+
+
 def forces_left(problem: Problem) -> tuple[float, tuple[float, ...], bool]:
     """What the forces of the present state leave at the displacements that are free, as a share of the largest of them; the
     vertex [mm] where it is largest: at rest, what Newton's method leaves; and whether loads are more than the rest."""

@@ -9,7 +9,7 @@ import numpy as np
 from netgen.meshing import NgException
 from numpy.typing import NDArray
 
-from ngswell.analysis.causes import anions_are_spent, imbalance, oscillating, outrun
+from ngswell.analysis.causes import anions_are_spent, imbalance, oscillating, outrun, released
 from ngswell.analysis.perturbations import Perturbations
 from ngswell.errors import OF_IONS, UNCONVERGED, Failure, NgswellError, Reason, place
 from ngswell.mesh.points import vertices
@@ -41,12 +41,13 @@ class Undetermined:
 
 
 def explain(
-    problem: Problem, snapshot: Snapshot, dt: float, failure: Failure, duration: float, first: bool
+    problem: Problem, snapshot: Snapshot, dt: float, failure: Failure, duration: float, first: bool, from_start: bool
 ) -> Failure | None:
     """What the state at `snapshot` says of a step of `dt` [s] from it that failed; None if nothing.
 
-    A singular system, a bath that oscillates, a charge that rises too fast, a `first` state whose forces do not balance, or
-    a state that is unstable within the `duration` [s] of the run. Not for systems too large for a factorisation, which the
+    A singular system, a bath that oscillates, a charge that rises too fast, a `first` state whose forces do not balance
+    (or ions that run out after such a one, in a run `from_start` of the scene), or a state that is unstable within the
+    `duration` [s] of the run. Not for systems too large for a factorisation, which the
     caller spares.
     """
     if failure.reason is Reason.NOT_ADMISSIBLE_AT_START:
@@ -62,8 +63,10 @@ def explain(
         return found.failure
     if failure.reason in OF_IONS or (failure.reason in UNCONVERGED and anions_are_spent(problem)):
         charge = outrun(problem, snapshot, dt, failure)
-        if charge is not None or failure.reason in OF_IONS:
+        if charge is not None:
             return charge
+        if failure.reason in OF_IONS:
+            return released(problem, snapshot) if from_start else None
     out_of_balance = imbalance(problem) if first else None  # what is not at rest has no stability
     if out_of_balance is not None:
         return out_of_balance

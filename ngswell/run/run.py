@@ -92,7 +92,7 @@ def _run(
             if checkpoint and (signals.stepping or isinstance(error, InstabilityError)):  # observers agree on the last step
                 checkpoint.save(log.restart)
             if isinstance(error, Failed):
-                raise _step_error(error, problem, stepper, start.time) from None
+                raise _step_error(error, problem, stepper, start) from None
             if isinstance(error, StepError):
                 error.end = stepper.accepted
             if not isinstance(error, Stopped):
@@ -107,11 +107,12 @@ def _run(
     return log.result(setup)
 
 
-def _step_error(failed: Failed, problem: Problem, stepper: Stepper, start: float) -> StepError:
-    """A failed step with what the last accepted state says of it, of a run from `start` [s]."""
-    cause, first = None, stepper.accepted.time == start
+def _step_error(failed: Failed, problem: Problem, stepper: Stepper, start: Start) -> StepError:
+    """A failed step with what the last accepted state says of it, of a run from `start`."""
+    cause, first, from_start = None, stepper.accepted.time == start.time, start.snapshot is None
     if stepper.factorisation.solver.direct:  # else too large for a factorisation
-        cause = explain(problem, stepper.accepted, failed.tried, failed.failure, stepper.timetable.duration, first)
+        duration = stepper.timetable.duration
+        cause = explain(problem, stepper.accepted, failed.tried, failed.failure, duration, first, from_start)
     return StepError(failed.time, failed.dt, failed.failure, cause, end=stepper.accepted)
 
 

@@ -113,6 +113,23 @@ def test_a_first_charged_scene_is_told_of_its_start():
     body(loads=carried, **BONDED).run(100.0, unstable="off")
 
 
+@pytest.mark.parametrize("salt", [0.15, 0.02])
+def test_a_charged_disc_is_told_of_its_start_also_when_it_has_begun_to_swell(salt):
+    # In potentials the first step fails, in concentrations one after some hundredths of a second, as ions run out.
+    model = Potential() if salt == 0.15 else Concentration()
+    pieces = {
+        "mesh": rectangle(1.0, 0.5, 4, 3), "kinematics": Axisymmetric(), "material": TABLE_2, "model": model,
+        "supports": [Roller("bottom", "z"), Roller("left", "r")], "baths": [Bath("top|right", c=salt)],
+    }  # fmt: skip
+    error = stops(Reason.OUT_OF_BALANCE, lambda: body(**pieces).run(100.0, Adaptive(1e-2), unstable="off"))
+    assert (error.time > 0) == (salt == 0.02)
+    assert "resume=scene.equilibrate()" in str(error)
+    assert "charge=Ramp((0, 0), (T, 1))" in str(error)
+    scene = body(**pieces)
+    scene.run(100.0, resume=scene.equilibrate(unstable="off"), unstable="off")
+    body(charge=Ramp((0, 0), (4e5, 1)), **pieces).run(4e5, Adaptive(1e-1), unstable="off")
+
+
 def test_a_sudden_release_takes_finer_cells():
     loose = [Roller("bottom", "xy")]
     stops(Reason.OUT_OF_BALANCE, lambda: body(supports=loose).run(100.0))
