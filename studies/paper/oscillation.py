@@ -1,8 +1,8 @@
 """Fig. 8: a strip in equilibrium, whose bath condition takes the charge of the last step or of the present one.
 
 The 1 × 30 strip of Table 1 starts in equilibrium with a constant bath; nothing should move. A disturbance of round-off size
-(the same for both treatments) is left to itself, in steps of 10 s. Once the lagged strip moves by some micrometres its
-steps fail, and the control of the steps shortens them. Numbers:
+(the same for both treatments) is left to itself, in steps of 10 s. Steps that fail, which those of the lagged strip may
+once it moves by some micrometres, are shortened and shown. Numbers:
 
 - `lagged_growth_per_step`: factor per step of the lagged treatment, measured where growth is clean; negative, it alternates;
 - `lagged_growth_predicted`: dominant eigenvalue of the linearised one-step map;
