@@ -65,6 +65,7 @@ from ngswell.scene import Scene
 from ngswell.schedules import Blend, Ramp
 from ngswell.setup.efflux import Efflux
 from ngswell.setup.loads import Load, Pressure, Traction, Weight
+from ngswell.setup.platen import Platen
 from ngswell.setup.setup import Setup
 from ngswell.setup.snapshot import Snapshot
 from ngswell.setup.supports import Pin, Roller, Support, Symmetry
@@ -83,11 +84,11 @@ __all__ = [
     "InputError", "InstabilityError", "InstabilityWarning", "Integral", "Lagged", "LeastSquares", "Ledger", "Load",
     "LocalDonnan", "LogNeoHookean", "MPa", "MackieMeares", "Material", "MooneyRivlin", "Multiplier", "NeoHookean",
     "NgswellError", "Nitsche", "Observer", "Outflow", "OutputError", "OverlapWarning", "Penalty", "Pin", "PlaneStrain",
-    "Potential", "PowerLaw", "Prescribed", "Pressure", "Probe", "Problem", "Progress", "Ramp", "Reaction", "Reason",
-    "Restart", "Result", "Role", "Roller", "Scene", "Setup", "Sine", "Snapshot", "Snapshots", "Spatial", "Spherical",
-    "Spline", "Stability", "StepError", "Support", "Symmetry", "Term", "Traction", "TwoLevelSolver", "Uncharged",
-    "UnitsWarning", "Vessel", "Weak", "Weight", "box", "by_region", "check_mesh", "column", "day", "from_occ", "hour",
-    "kPa", "metre", "micrometre", "ray", "read_checkpoint", "read_mesh", "rectangle", "year",
+    "Platen", "Potential", "PowerLaw", "Prescribed", "Pressure", "Probe", "Problem", "Progress", "Ramp", "Reaction",
+    "Reason", "Restart", "Result", "Role", "Roller", "Scene", "Setup", "Sine", "Snapshot", "Snapshots", "Spatial",
+    "Spherical", "Spline", "Stability", "StepError", "Support", "Symmetry", "Term", "Traction", "TwoLevelSolver",
+    "Uncharged", "UnitsWarning", "Vessel", "Weak", "Weight", "box", "by_region", "check_mesh", "column", "day",
+    "from_occ", "hour", "kPa", "metre", "micrometre", "ray", "read_checkpoint", "read_mesh", "rectangle", "year",
 ]  # fmt: skip
 
 for _name in __all__:

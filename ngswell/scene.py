@@ -113,6 +113,9 @@ class Scene(Setup):
             volume = product("-", power_of_mm(problem))
             vessel = "" if bath.vessel is None else f"; in a vessel of {bath.vessel.volume:g} {volume}{bath.vessel}"
             lines.append(f"  bath on {bath.boundary}: {self.treatment(bath)}{carried}{vessel}")
+        for one in (one for one in self.held() if one.moves):
+            how = "displaced" if one.force is None else "displaced as one by a force"
+            lines.append(f"  {type(one.support).__name__} on {one.boundary}: {how} along {one.direction}")
         lines += [f"  {name}: {law}" for name, law in self.material.laws().items()]
         lines += [f"  limit: {limit}" for limit in limits(self)]
         return "\n".join(lines)

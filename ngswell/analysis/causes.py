@@ -54,14 +54,24 @@ def forces_left(problem: Problem) -> tuple[float, tuple[float, ...], bool]:
     force = problem.fields.vec.CreateVector()
     u = problem.ranges[problem.names[0]]
     free = np.array(list(problem.free), dtype=float)[u]
+    for tie in problem.ties:
+        free[tie.dofs[0]] = 1.0
     left, largest, loads = np.zeros(problem.vector.size), 0.0, np.zeros(problem.vector.size)
     for term in problem.terms:
         form(problem, [term], 0.0).Apply(problem.fields.vec, force)
-        share = force.FV().NumPy()[u] * free
+        share = force.FV().NumPy()[u].copy()
+        for tie in problem.ties:
+            share[tie.dofs[0]] = share[tie.dofs].sum()
+        share *= free
         left[u] += share
         largest = max(largest, float(np.abs(share).max()))
         if term.role is Role.LOAD:
             loads[u] += share
+    for tie in problem.ties:
+        pushed = tie.force.at(problem.time)
+        left[tie.dofs[0]] -= pushed
+        loads[tie.dofs[0]] -= pushed
+        largest = max(largest, abs(pushed))
     loaded = bool(np.abs(loads).max() > np.abs(left - loads).max())
     return (float(np.abs(left).max()) / largest if largest else 0.0), problem.worst(left)[1], loaded
 

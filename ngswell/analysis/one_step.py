@@ -80,7 +80,7 @@ def _linearised_step(problem: Problem, time: float, dt: float, scale: NDArray) -
     if failure is not None:
         raise NgswellError(f"growth_factor: the step of {dt:g} s from t = {time:g} s does not succeed: {failure.text}")
     new = problem.vector.copy()
-    if not solver.factorise(problem.linearise()):
+    if not solver.prepare(problem.linearise(), problem.ties):
         raise NgswellError(f"growth_factor: the linearised step of {dt:g} s from t = {time:g} s is singular")
 
     def perturbed(direction: NDArray) -> tuple[NDArray, NDArray]:

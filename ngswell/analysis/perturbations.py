@@ -82,6 +82,8 @@ class Perturbations:
         u = problem.ranges["u"]
         self._moving = np.zeros(problem.vector.size)
         self._moving[u] = np.array(list(problem.free), dtype=float)[u]
+        for tie in problem.ties:
+            self._moving[tie.dofs] = 1.0
         self._vectors = [problem.fields.vec.CreateVector() for _ in range(2)]
         self._values = [vector.FV().NumPy() for vector in self._vectors]
 
@@ -93,7 +95,7 @@ class Perturbations:
             ready = self._solver.renew(self.problem)
         else:
             self._system.AssembleLinearization(self.problem.fields.vec)
-            ready = self._solver.factorise(self._system.mat)
+            ready = self._solver.prepare(self._system.mat, self.problem.ties)
         self.problem.dt.Set(step)
         if not ready:
             raise NgswellError(f"the linearised balances are singular or not finite for perturbations of rate {rate:g} 1/s")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from ngsolve import BND, CF, H1, VOL, BitArray, Compress, FESpace, GridFunction, NumberSpace
@@ -16,6 +16,7 @@ from ngswell.models.model import BathFields, FieldContext
 from ngswell.models.one_number import OneNumber
 from ngswell.problem.lumping import Storage
 from ngswell.schedules import Clock, Schedule
+from ngswell.setup.displacements import Held
 from ngswell.setup.loads import followed
 from ngswell.setup.setup import Setup
 from ngswell.setup.snapshot import Snapshot
@@ -26,6 +27,13 @@ BONUS_ORDER = 2
 
 ROUND_OFF = 1e-12
 """What a held displacement may be off by, in units of its reference, and count as held."""
+
+
+class Tie(NamedTuple):
+    """Coefficients of the displacement that are one number, and the force over time that moves it."""
+
+    dofs: NDArray
+    force: Schedule
 
 
 class Discretisation:
@@ -151,7 +159,10 @@ class Discretisation:
             )
         if snapshot.values.shape != (self.space.ndof,):
             raise InputError(f"{what}: the snapshot has {snapshot.values.size} unknowns, the scene {self.space.ndof}")
-        shall = self.displaced_at(snapshot.time)[self._held]
+        shall = self.displaced_at(snapshot.time)
+        for tie in self.ties:  # anywhere, but as one
+            shall[tie.dofs] = snapshot.values[tie.dofs[0]]
+        shall = shall[self._held]
         off = np.abs(snapshot.values[self._held] - shall)
         if off.size and not off.max() <= ROUND_OFF * self.references[self.names[0]]:
             worst = int(np.argmax(np.where(np.isfinite(off), off, np.inf)))
@@ -165,13 +176,18 @@ class Discretisation:
     @cached_property
     def displaced(self) -> list[tuple[NDArray, Schedule]]:
         """Coefficients of the displacement that follow histories: those of vertices. The others there vanish."""
+        return [(self._dofs(one), one.history) for one in self.setup.held() if one.moves and one.force is None]
+
+    @cached_property
+    def ties(self) -> list[Tie]:
+        """Coefficients of the displacement that forces move as one."""
+        return [Tie(self._dofs(one), one.force) for one in self.setup.held() if one.force is not None]
+
+    def _dofs(self, one: Held) -> NDArray:
+        """Coefficients at the vertices of what a support holds: where those alone are not zero it is moved as a whole."""
         per_component = self.space.components[0].ndof // len(self.kinematics.directions)
-        return [
-            (axis * per_component + np.array(sorted(vertices_of(self.mesh, one.boundary))), one.history)
-            for axis, direction in enumerate(self.kinematics.directions)
-            for one in self.setup.held()
-            if one.moves and one.direction == direction
-        ]
+        first = per_component * self.kinematics.directions.index(one.direction)
+        return first + np.array(sorted(vertices_of(self.mesh, one.boundary)))
 
     def displaced_at(self, time: float) -> NDArray:
         """Coefficients of the displacement on supports at `time` [s], 0 elsewhere."""
@@ -188,7 +204,7 @@ class Discretisation:
     @cached_property
     def _still(self) -> NDArray:
         """Numbers of those that they hold at zero."""
-        moved = [dofs for dofs, _ in self.displaced]
+        moved = [*(dofs for dofs, _ in self.displaced), *(tie.dofs for tie in self.ties)]
         return np.setdiff1d(self._held, np.concatenate(moved)) if moved else self._held
 
     def _place(self, dof: int) -> tuple[float, ...]:

@@ -201,9 +201,14 @@ class Problem(Discretisation):
         return self._prescribed.gap(self.vector)
 
     def residual(self, result: BaseVector) -> None:
-        """r at the present fields, on all degrees of freedom (constrained ones hold reactions)."""
+        """r at the present fields, on all degrees of freedom (constrained ones hold reactions).
+
+        Where a force moves a side as one, the sum of the reactions and less the force is what has to vanish.
+        """
         self._system.Apply(self.fields.vec, result)
         result.data -= (1 / self.dt.Get()) * self._old_contents
+        for tie in self.ties:
+            result[int(tie.dofs[0])] -= tie.force.at(self.time)
 
     def linearise(self) -> BaseMatrix:
         """dr/dx at the present fields, on all degrees of freedom."""

@@ -21,16 +21,26 @@ STILL = Ramp((0.0, 0.0))
 
 
 class Held(NamedTuple):
-    """A direction that a support holds on a boundary ("a|b"), and the displacement there over time [mm]."""
+    """A direction that a support holds on a boundary ("a|b"), and the displacement there over time [mm].
+
+    With a `force` over time the displacement there is an unknown, the same at all places.
+    """
 
     support: Support
     direction: str
     boundary: str
     history: Schedule
+    force: Schedule | None = None
 
     @property
     def moves(self) -> bool:
-        return any(self.history.values)
+        return self.force is not None or any(self.history.values)
+
+    def agrees(self, other: Held) -> bool:
+        """Whether two hold what they share alike, as far as is known."""
+        if self.support is other.support or not (self.moves or other.moves):
+            return True
+        return self.force is None and other.force is None and _same(self.history, other.history)
 
     def __str__(self) -> str:
         return f"{type(self.support).__name__} on {self.boundary!r}"
@@ -39,10 +49,10 @@ class Held(NamedTuple):
 def held(supports: Sequence[Support], surroundings: Surroundings) -> Iterator[Held]:
     """All that supports hold on boundaries, in the order of the scene."""
     for support in supports:
-        moving = support.displacements(surroundings)
+        moving, forces = support.displacements(surroundings), support.forces(surroundings)
         for direction, boundary in support.fixed(surroundings).items():
             if boundary:
-                yield Held(support, direction, boundary, moving.get(direction, STILL))
+                yield Held(support, direction, boundary, moving.get(direction, STILL), forces.get(direction))
 
 
 def by_direction(directions: str, found: Iterable[Held]) -> dict[str, str]:
@@ -85,7 +95,7 @@ def _check_agreement(everything: list[Held], pins: list[tuple[int, str]], surrou
     for one in everything:
         for vertex in vertices_of(surroundings.mesh, one.boundary):
             other = found.setdefault((vertex, one.direction), one)
-            if not _same(one.history, other.history):
+            if not one.agrees(other):
                 raise InputError(f"{other} and {one} hold {_where(surroundings, vertex, one.direction)} differently")
     for vertex, direction in pins:
         if (vertex, direction) in found and (other := found[vertex, direction]).moves:
@@ -101,4 +111,4 @@ def _where(surroundings: Surroundings, vertex: int, direction: str) -> str:
 def _same(one: Schedule, other: Schedule) -> bool:
     """Whether two histories are known to be one."""
     values = {*one.values, *other.values}
-    return one is other or len(values) == 1 or bool(type(one) is type(other) and one == other)
+    return len(values) == 1 or bool(type(one) is type(other) and one == other)

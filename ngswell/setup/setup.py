@@ -83,7 +83,7 @@ class Setup:
         still = (one for one in self.held() if not one.moves)
         self.kinematics.check(self.mesh, by_direction(self.kinematics.directions, still))
         wet = {number for bath in self.baths for number in vertices_of(self.mesh, bath.boundary)}
-        check_determined(self.mesh, self.sides.parts, self.kinematics, self.fixed(), self.pins(), wet)
+        check_determined(self.mesh, self.sides.parts, self.kinematics, self.held(), self.pins(), wet)
         for load in self.loads:
             load.check_in(self)
         self.initial_bath()  # refuses baths that differ at the start
@@ -104,7 +104,7 @@ class Setup:
         checks.instance("charge", self.charge, Ramp, "a Ramp of factors on cfc0, such as Ramp((0, 0.0), (4000, 1.0))")
         checks.set_fields(
             self,
-            supports=checks.several("supports", self.supports, Support, "Roller, Symmetry or Pin"),
+            supports=checks.several("supports", self.supports, Support, "Roller, Symmetry, Platen or Pin"),
             baths=checks.several("baths", self.baths, Bath, "Bath(...)"),
             loads=checks.several("loads", self.loads, Load, "Traction, Pressure, Weight or Efflux"),
             start=checks.number("start", self.start, "s", -LARGEST, LARGEST),

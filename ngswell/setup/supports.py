@@ -22,8 +22,9 @@ class Support(Protocol):
     1. `check_in`: its refusals;
     2. `fixed`: boundaries on which it holds components of the displacement;
     3. `displacements`: the histories of those that move there; the others vanish;
-    4. `pins`: vertices at which components vanish;
-    5. `schedules`: the histories that it follows, if any.
+    4. `forces`: the histories of forces under which they move there as one instead;
+    5. `pins`: vertices at which components vanish;
+    6. `schedules`: the histories that it follows, if any.
     """
 
     schedules: tuple[Schedule, ...] = ()
@@ -36,6 +37,10 @@ class Support(Protocol):
 
     def displacements(self, surroundings: Surroundings) -> dict[str, Schedule]:
         """Histories [mm] by direction, of the displacement on the boundaries of `fixed`: one number there at each time."""
+        return {}
+
+    def forces(self, surroundings: Surroundings) -> dict[str, Schedule]:
+        """Histories of the force, in the units of `Reaction`, by direction; the displacement is one number, an unknown."""
         return {}
 
     def pins(self, surroundings: Surroundings) -> list[tuple[int, str]]:

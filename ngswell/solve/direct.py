@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from functools import cache
 
 import numpy as np
 from netgen.meshing import NgException
 from ngsolve import H1, BaseMatrix, BaseVector, BilinearForm, BitArray, dx
 from ngsolve.meshes import Make1DMesh
+from numpy.typing import NDArray
 
+from ngswell.problem.discretisation import Tie
 from ngswell.problem.problem import Problem
 
 
@@ -43,6 +46,7 @@ class LinearSolver:
         self._free = free
         self._matrix: BaseMatrix | None = None
         self._inverse: BaseMatrix | None = None
+        self._ties: Ties | None = None
         self.factorisations = self.solves = 0
 
     def factorise(self, matrix: BaseMatrix) -> bool:
@@ -70,16 +74,25 @@ class LinearSolver:
             matrix = self.linearise(problem)
         except NgException:
             return False
-        return self.factorise(matrix)
+        return self.prepare(matrix, problem.ties)
+
+    def prepare(self, matrix: BaseMatrix, ties: Sequence[Tie]) -> bool:
+        """Factorise, and find how the free degrees of freedom follow those of `ties`, each of which are one number."""
+        if not self.factorise(matrix):
+            return False
+        self._ties = Ties(matrix, ties, self.invert) if ties else None
+        return self._ties is None or self._ties.regular
 
     def solve(self, right: BaseVector, solution: BaseVector, prescribed: BaseVector | None = None) -> bool:
         """solution = A⁻¹ right, with `prescribed` values where degrees of freedom are not free; False if not finite."""
-        if prescribed is None:
-            solved = self.invert(right, solution)
-        else:
+        moved = right
+        if prescribed is not None:
             moved = right.CreateVector()
             moved.data = right - self._matrix * prescribed
-            solved = self.invert(moved, solution)
+        solved = self.invert(moved, solution)
+        if self._ties is not None:
+            self._ties.move(moved, solution)
+        if prescribed is not None:
             solution.data += prescribed
         self.solves += 1
         return solved and bool(np.isfinite(solution.FV().NumPy()).all())
@@ -90,6 +103,43 @@ class LinearSolver:
             raise RuntimeError("factorise before solving")
         solution.data = self._inverse * right
         return True
+
+
+class Ties:
+    """Degrees of freedom that are one number, by elimination: A x = b where x is free or on a tie, and equal on each tie.
+
+    With the columns t of ones on ties, m = t − A_ff⁻¹ A t is how all follows a tie that moves by one. Then
+
+        x = A_ff⁻¹ b + m q,   tᵀA m q = tᵀ(b − A A_ff⁻¹ b).
+    """
+
+    def __init__(self, matrix: BaseMatrix, ties: Sequence[Tie], invert: Callable[[BaseVector, BaseVector], bool]) -> None:
+        self._matrix, self._dofs, self._work = matrix, [tie.dofs for tie in ties], matrix.CreateColVector()
+        self._followed: list[NDArray] = []
+        stiffness, found = [], True
+        for dofs in self._dofs:
+            one, answer = matrix.CreateColVector(), matrix.CreateColVector()
+            one[:] = 0.0
+            one.FV().NumPy()[dofs] = 1.0
+            self._work.data = matrix * one
+            found &= invert(self._work, answer)
+            one -= answer
+            self._work.data = matrix * one
+            stiffness.append(self._summed(self._work))
+            self._followed.append(one.FV().NumPy().copy())
+        self._stiffness = np.array(stiffness).T
+        self.regular = bool(found and np.isfinite(self._stiffness).all() and np.linalg.det(self._stiffness) != 0)
+
+    def _summed(self, vector: BaseVector) -> list[float]:
+        values = vector.FV().NumPy()
+        return [float(values[dofs].sum()) for dofs in self._dofs]
+
+    def move(self, right: BaseVector, solution: BaseVector) -> None:
+        """Add what ties move to a `solution` on the free degrees of freedom."""
+        self._work.data = right - self._matrix * solution
+        amounts = np.linalg.solve(self._stiffness, self._summed(self._work))
+        for amount, followed in zip(amounts, self._followed, strict=True):
+            solution.FV().NumPy()[:] += amount * followed
 
 
 class CondensedSolver(LinearSolver):
