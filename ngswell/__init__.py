@@ -51,6 +51,7 @@ from ngswell.observers.sampling import Area, Integral, Probe, Snapshots
 from ngswell.observers.stability import Stability
 from ngswell.observers.vtk import VTK
 from ngswell.physics.elastic import HolmesMowSolid, LogNeoHookean, MooneyRivlin
+from ngswell.physics.fibres import FibreDistribution, FibreReinforced, Fibres
 from ngswell.physics.kinematics import Axisymmetric, Confined, PlaneStrain, Spatial
 from ngswell.physics.material import TABLE_1, TABLE_2, Material
 from ngswell.physics.pores import HolmesMow, MackieMeares, PowerLaw
@@ -78,17 +79,17 @@ from ngswell.units import MPa, day, hour, kPa, metre, micrometre, year
 from ngswell.version import __version__ as __version__
 
 __all__ = [
-    "BACKWARD_EULER", "CSV", "ESDIRK4", "TABLE_1", "TABLE_2", "VTK", "Adaptive", "Area", "Averaged", "Axisymmetric",
-    "Bath", "Blend", "Call", "Checkpoint", "Coarseness", "Concentration", "Confined", "Cylindrical", "DampedNewton",
-    "Efflux", "Essential", "ExtrapolationWarning", "Fixed", "Frozen", "HolmesMow", "HolmesMowSolid", "InnerLayer",
-    "InputError", "InstabilityError", "InstabilityWarning", "Integral", "Lagged", "LeastSquares", "Ledger", "Load",
-    "LocalDonnan", "LogNeoHookean", "MPa", "MackieMeares", "Material", "MooneyRivlin", "Multiplier", "NeoHookean",
-    "NgswellError", "Nitsche", "Observer", "Outflow", "OutputError", "OverlapWarning", "Penalty", "Pin", "PlaneStrain",
-    "Platen", "Potential", "PowerLaw", "Prescribed", "Pressure", "Probe", "Problem", "Progress", "Ramp", "Reaction",
-    "Reason", "Restart", "Result", "Role", "Roller", "Scene", "Setup", "Sine", "Snapshot", "Snapshots", "Spatial",
-    "Spherical", "Spline", "Stability", "StepError", "Support", "Symmetry", "Term", "Traction", "TwoLevelSolver",
-    "Uncharged", "UnitsWarning", "Vessel", "Weak", "Weight", "box", "by_region", "check_mesh", "column", "day",
-    "from_occ", "hour", "kPa", "metre", "micrometre", "ray", "read_checkpoint", "read_mesh", "rectangle", "year",
+    "BACKWARD_EULER", "CSV", "ESDIRK4", "TABLE_1", "TABLE_2", "VTK", "Adaptive", "Area", "Averaged", "Axisymmetric", "Bath",
+    "Blend", "Call", "Checkpoint", "Coarseness", "Concentration", "Confined", "Cylindrical", "DampedNewton", "Efflux",
+    "Essential", "ExtrapolationWarning", "FibreDistribution", "FibreReinforced", "Fibres", "Fixed", "Frozen", "HolmesMow",
+    "HolmesMowSolid", "InnerLayer", "InputError", "InstabilityError", "InstabilityWarning", "Integral", "Lagged",
+    "LeastSquares", "Ledger", "Load", "LocalDonnan", "LogNeoHookean", "MPa", "MackieMeares", "Material", "MooneyRivlin",
+    "Multiplier", "NeoHookean", "NgswellError", "Nitsche", "Observer", "Outflow", "OutputError", "OverlapWarning", "Penalty",
+    "Pin", "PlaneStrain", "Platen", "Potential", "PowerLaw", "Prescribed", "Pressure", "Probe", "Problem", "Progress",
+    "Ramp", "Reaction", "Reason", "Restart", "Result", "Role", "Roller", "Scene", "Setup", "Sine", "Snapshot", "Snapshots",
+    "Spatial", "Spherical", "Spline", "Stability", "StepError", "Support", "Symmetry", "Term", "Traction", "TwoLevelSolver",
+    "Uncharged", "UnitsWarning", "Vessel", "Weak", "Weight", "box", "by_region", "check_mesh", "column", "day", "from_occ",
+    "hour", "kPa", "metre", "micrometre", "ray", "read_checkpoint", "read_mesh", "rectangle", "year",
 ]  # fmt: skip
 
 for _name in __all__:

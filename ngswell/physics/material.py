@@ -15,7 +15,7 @@ from ngswell.errors import InputError
 from ngswell.mesh.points import points
 from ngswell.physics.pores import Constant, Diffusivity, Permeability
 from ngswell.physics.ranges import ONE_NUMBER, within
-from ngswell.physics.solid import NeoHookean, SolidLaw, nominal_stress
+from ngswell.physics.solid import Located, NeoHookean, SolidLaw, fields_of, nominal_stress
 
 GAS_CONSTANT = 8.3144e-3
 """R [N/mm² per mol/l and K]."""
@@ -106,6 +106,11 @@ class Material:
         """Rθ [N/mm² per mol/l]."""
         return GAS_CONSTANT * self.theta
 
+    @property
+    def kinked(self) -> bool:
+        """Whether the stiffness of the solid jumps somewhere: what the law says of itself."""
+        return bool(getattr(self.solid, "kinked", False))
+
     def number(self, name: str) -> float:
         """The parameter `name` as one number, for closed forms; InputError if it is a field of position."""
         value = getattr(self, name)
@@ -136,16 +141,15 @@ class Material:
         for field in fields(self):
             value = getattr(self, field.name)
             if isinstance(value, CoefficientFunction):
-                regions = getattr(value, "regions", mesh.GetMaterials())
-                if regions != mesh.GetMaterials():
-                    raise InputError(
-                        f"{field.name} is by_region of another mesh, with the regions {', '.join(map(repr, regions))}; the "
-                        f"scene's has {', '.join(map(repr, mesh.GetMaterials()))}: make it with the scene's mesh"
-                    )
+                _check_regions(field.name, value, mesh)
                 samples = value(where).ravel()
                 within(field.name, float(samples.min()))
                 within(field.name, float(samples.max()))
 
+        for name, value in fields_of(self.solid):
+            _check_regions(name, value, mesh)
+        if isinstance(self.solid, Located):
+            self.solid.check_on(mesh)
         try:
             stress = float(np.abs(nominal_stress(Id(3), self)(where)).max())
         except Exception as error:  # whatever a user's law raises on fields
@@ -160,6 +164,15 @@ class Material:
         """Largest value of the parameter `name` over the quadrature points of `mesh`, in the parameter's unit."""
         value = getattr(self, name)
         return float(value(points(mesh, VOL, 4)).max()) if isinstance(value, CoefficientFunction) else float(value)
+
+
+def _check_regions(name: str, field: CoefficientFunction, mesh: Mesh) -> None:
+    regions = getattr(field, "regions", mesh.GetMaterials())
+    if regions != mesh.GetMaterials():
+        raise InputError(
+            f"{name} is by_region of another mesh, with the regions {', '.join(map(repr, regions))}; the scene's has "
+            f"{', '.join(map(repr, mesh.GetMaterials()))}: make it with the scene's mesh"
+        )
 
 
 def _sample(name: str, law: Any, arguments: tuple[float, ...], example: str) -> float:

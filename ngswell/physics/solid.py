@@ -55,7 +55,10 @@ class SolidLaw(Protocol):
     1. gives `energy`, a density per reference volume [N/mm²], whose derivative by F is the extra stress;
     2. takes `content` where it has its pole at the compression point: there J does not tell J − nS0;
     3. has no stress at F = I, eq. (35): a scene refuses it otherwise;
-    4. is a frozen dataclass: its fields tell checkpoints one law from another, and `describe()` prints them.
+    4. is a frozen dataclass: its fields tell checkpoints one law from another, and `describe()` prints them;
+    5. has `check_on(mesh)` if it refuses values of fields of position (`Located`);
+    6. has `kinked = True` if its stiffness jumps, as that of fibres that bear tension only: Newton's method then goes on
+       where it would stall.
 
     Forms, stress outputs, closed forms and stability all take this one energy.
     """
@@ -63,6 +66,13 @@ class SolidLaw(Protocol):
     def energy(self, deformation: Deformation, material: SolidParameters, /) -> CoefficientFunction:
         """ψ(F, J, J − nS0) [N/mm²], up to a constant."""
         ...
+
+
+@runtime_checkable
+class Located(Protocol):
+    """A law with fields of position, such as directions of fibres, that says its refusals when a scene brings the mesh."""
+
+    def check_on(self, mesh: Mesh, /) -> None: ...
 
 
 @dataclass(frozen=True)

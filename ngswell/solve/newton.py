@@ -13,6 +13,7 @@ from ngswell.errors import Failure, Reason
 from ngswell.problem.admissible import Violation
 from ngswell.problem.problem import Problem
 from ngswell.solve.factorisation import Factorisation
+from ngswell.solve.search import search
 
 ROUND_OFF = 1e-13
 """Share of a reference size that no correction is asked to be below for the sake of small `shares`."""
@@ -22,6 +23,10 @@ STAGNANT = 1e-11
 
 SHORTEST = 1e-12
 """Share of a correction below which keeping the fields admissible leaves none of it."""
+
+
+PATIENCE = 4
+"""How many times more iterations a solid with kinks may take."""
 
 
 @dataclass(frozen=True)
@@ -41,6 +46,9 @@ class DampedNewton:
     to `least_damping` until the simplified correction (old matrix, new residual) is smaller than the correction: the natural
     monotonicity test, which does not depend on units or on how equations are scaled. The simplified correction that passes
     the test of convergence is applied as well, so accepted states are about a factor `tolerance` better than tested.
+
+    At kinks of a solid, where fibres go taut, the old matrix knows one side only: where the test passes no step, the part of
+    the correction that does work is taken (`search`).
 
     A factorisation is kept, over iterations, stages and steps, as long as each correction is at most `slowest` times the one
     before; the error that is left is then estimated as that of a geometric series. With 0, each iteration has its own.
@@ -66,7 +74,8 @@ class DampedNewton:
     def solve(self, problem: Problem, factorisation: Factorisation, shares: dict[str, float] | None = None) -> Outcome:
         """Iterate from the fields of `problem`, in place. In the test of convergence, by unknown, `shares` of the references
         take their place."""
-        return _Iteration(self, problem, factorisation, shares or {}).run()
+        patient = replace(self, most_iterations=PATIENCE * self.most_iterations) if problem.setup.material.kinked else self
+        return _Iteration(patient, problem, factorisation, shares or {}).run()
 
     def solve_from_above(
         self, problem: Problem, factorisation: Factorisation, shares: dict[str, float] | None = None
@@ -163,6 +172,8 @@ class _Iteration:
                     return self._success(), True, damping
                 if self.beyond:
                     return self._violated(self.beyond.reason, self.beyond), False, damping
+                if self._past_kinks():
+                    return None, True, 1.0
                 return self._failed(Reason.STALLED), False, damping
         if not fresh and (refused or not rate < 1):
             vector[:] = start
@@ -170,6 +181,12 @@ class _Iteration:
             return None, False, damping
         self.factorisation.contracted(rate)
         return None, True, damping
+
+    def _past_kinks(self) -> bool:
+        """Whether as much of the correction as does work is taken; `simplified` then answers the residual there."""
+        if not self.problem.setup.material.kinked or not search(self.problem, self.correction, self.residual):
+            return False
+        return self.factorisation.renew(self.problem) and self._solve(self.simplified)
 
     def _finish(self) -> Outcome:
         """Apply the simplified correction that passed the test as well."""
