@@ -65,7 +65,7 @@ class Ledger(Recorder):
         gone = {key: self._contents[key] - now for key, now in contents.items()}
         self._contents = contents
         end = problem.snapshot(step.time)
-        for weight, time, values in step.stages:
+        for weight, time, values in (stage for stage in step.stages if stage.weight):
             problem.restore(Snapshot(time, values))
             flows = effluxes.flows()
             for key, flow in effluxes.sums(flows).items():

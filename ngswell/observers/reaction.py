@@ -34,9 +34,8 @@ class Reaction(Recorder):
 
     `values` has one row a time: N/mm² in a column, N per mm of thickness in plane strain or length of a cylinder, N in
     space, and N on the whole circumference, 2π, when axisymmetric; along r that is the sum of the radial forces. At a
-    start out of balance it is that of the fields as they are. With `to`, a path or a `CSV`, records go to that file.
-    Raises InputError for a boundary on
-    which nothing is held.
+    start out of balance it is that of the fields as they are. With `to`, a path or a `CSV`, records go to that file;
+    `dense` as in `Probe`. Raises InputError for a boundary on which nothing is held.
     """
 
     def __init__(
@@ -44,10 +43,11 @@ class Reaction(Recorder):
         boundary: str,
         when: float | Sequence[float] | None = None,
         to: str | Path | CSV | None = None,
+        dense: bool = False,
     ) -> None:
         checks.name("Reaction: boundary", boundary, "bottom")
         self.boundary = boundary
-        super().__init__(when, boundary, to=to)
+        super().__init__(when, boundary, to=to, dense=dense)
 
     def prepare(self, problem: Problem, begin: float, until: float) -> None:
         names, owners = problem.setup.check_boundary("Reaction", self.boundary), _owners(problem.setup)

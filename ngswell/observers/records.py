@@ -12,9 +12,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ngswell import checks
+from ngswell.errors import InputError
 from ngswell.files import Tree
 from ngswell.observers.base import Observer
 from ngswell.problem.problem import Problem
+from ngswell.setup.snapshot import Snapshot
+from ngswell.stepping.steps import Step
 from ngswell.streams import CSV, Stream
 
 
@@ -98,14 +102,27 @@ def product(unit: str, power: int) -> str:
 
 class Recorder(Observer):
     """An observer whose records are rows of numbers: in the memory, or in the file `to` (a `CSV`, or its path), from which
-    they are read when asked for. A class gives `row` and `unit` in place of `record`, `state`, `restore` and `table`."""
+    they are read when asked for. A class gives `row` and `unit` in place of `record`, `state`, `restore` and `table`.
+
+    Steps do not land on the times `when` of one that is `dense`: its records lie on the scheme's interpolant of the rows at
+    the stages of a step (`Step.weights`). Such a class gives rows of the present fields alone.
+    """
 
     def __init__(
-        self, when: float | Sequence[float] | None = None, *settings: object, to: str | Path | CSV | None = None
+        self,
+        when: float | Sequence[float] | None = None,
+        *settings: object,
+        to: str | Path | CSV | None = None,
+        dense: bool = False,
     ) -> None:
-        file = CSV.of(f"{type(self).__name__}: to", to)
-        super().__init__(when, *settings, *(() if file is None else (file,)))
-        self._table = Table(type(self).__name__, file)
+        what = type(self).__name__
+        file = CSV.of(f"{what}: to", to)
+        checks.flag(f"{what}: dense", dense)
+        if dense and when is None:
+            raise InputError(f"{what}: dense records lie between steps, at times `when`: give an interval or a list [s]")
+        self._dense = bool(dense)
+        super().__init__(when, *settings, *(("dense",) if dense else ()), *(() if file is None else (file,)))
+        self._table = Table(what, file)
 
     @abstractmethod
     def row(self, problem: Problem) -> Mapping[str, Any]:
@@ -138,6 +155,22 @@ class Recorder(Observer):
         self._table.resume(state)
         self.restore(state)
 
+    def plan(self, begin: float, until: float) -> list[float]:
+        times = super().plan(begin, until)
+        return [] if self._dense else times
+
+    def observe(self, problem: Problem, step: Step) -> None:
+        if not self._dense:
+            super().observe(problem, step)
+        elif times := self._when.passed(step.stages[0].time, step.time):
+            end, rows = problem.snapshot(step.time), []
+            for _, time, values in step.stages:
+                problem.restore(Snapshot(time, values))
+                rows.append(self.row(problem))
+            problem.restore(end)
+            for time in times:
+                self._table.append(time, _combined(step.weights(time), rows))
+
     def _record_if_due(self, problem: Problem, time: float) -> None:
         if self._when.due(time):
             self._table.append(time, self.row(problem))
@@ -150,3 +183,8 @@ class Recorder(Observer):
 
     def finish(self, problem: Problem) -> None:
         self._table.close()
+
+
+def _combined(weights: NDArray, rows: Sequence[Mapping[str, Any]]) -> dict[str, NDArray]:
+    """The sum of rows, each times its weight."""
+    return {name: np.tensordot(weights, np.array([row[name] for row in rows], dtype=float), 1) for name in rows[0]}

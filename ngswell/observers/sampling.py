@@ -32,6 +32,9 @@ class Probe(Recorder):
     units are those of `ngswell.models.solid_state.OUTPUT_UNITS`. With `to`, a path or a `CSV`, records go to that file.
     Fluxes and stress are made of derivatives: good inside cells; at a bath take `Outflow`. Warns with ExtrapolationWarning,
     once, at a corner where J − nS0 is not positive.
+
+    With `dense`, records at the times `when` lie on the scheme's interpolant between steps, and no step lands there: as
+    accurate as those at the ends of steps, but for the first steps after a sudden change.
     """
 
     def __init__(
@@ -40,13 +43,14 @@ class Probe(Recorder):
         *quantities: str,
         when: float | Sequence[float] | None = None,
         to: str | Path | CSV | None = None,
+        dense: bool = False,
     ) -> None:
         if not quantities:
             raise InputError("Probe: name at least one quantity, such as 'displacement'")
         for quantity in quantities:
             checks.name("Probe: a quantity", quantity, "displacement")
         self.point, self.quantities = checks.vector("Probe: point", point, 1e6, "mm"), quantities
-        super().__init__(when, self.point, *quantities, to=to)
+        super().__init__(when, self.point, *quantities, to=to, dense=dense)
         self._warned = False
 
     def prepare(self, problem: Problem, begin: float, until: float) -> None:
@@ -73,7 +77,7 @@ class Probe(Recorder):
 class Integral(Recorder):
     """Integral of a quantity over the deformed body, or over the deformed `boundary`; of 1 if no quantity is named.
 
-    With `to`, a path or a `CSV`, records go to that file.
+    With `to`, a path or a `CSV`, records go to that file; `dense` as in `Probe`.
 
     Raises InputError for a flux on a boundary: `Outflow` has it from the balances. "stress" is made of derivatives too: its
     integral over a held side or a corner is off at any mesh where the stress is singular; `Reaction` has the force there.
@@ -85,8 +89,9 @@ class Integral(Recorder):
         boundary: str | None = None,
         when: float | Sequence[float] | None = None,
         to: str | Path | CSV | None = None,
+        dense: bool = False,
     ) -> None:
-        super().__init__(when, quantity, boundary, to=to)
+        super().__init__(when, quantity, boundary, to=to, dense=dense)
         for what, value, example in (("quantity", quantity, "p"), ("boundary", boundary, "top")):
             if value is not None:
                 checks.name(f"Integral: {what}", value, example)
@@ -126,8 +131,10 @@ class Integral(Recorder):
 class Area(Integral):
     """Area of the deformed body in plane strain [mm²], its volume in three dimensions [mm³], its length confined [mm]."""
 
-    def __init__(self, when: float | Sequence[float] | None = None, to: str | Path | CSV | None = None) -> None:
-        super().__init__(when=when, to=to)
+    def __init__(
+        self, when: float | Sequence[float] | None = None, to: str | Path | CSV | None = None, dense: bool = False
+    ) -> None:
+        super().__init__(when=when, to=to, dense=dense)
 
 
 class Snapshots(Observer):

@@ -52,7 +52,17 @@ class When:
         if self.value is None:
             return True
         after = bisect_left(self._times, time)
-        return any(isclose(time, t, rel_tol=1e-12, abs_tol=1e-12) for t in self._times[max(0, after - 1) : after + 1])
+        return any(_same(time, t) for t in self._times[max(0, after - 1) : after + 1])
+
+    def passed(self, start: float, end: float) -> list[float]:
+        """Those of a step from `start` to `end` [s], the end included, the start not."""
+        inside = self._times[bisect_left(self._times, start) : bisect_left(self._times, end)]
+        between = [time for time in inside if not _same(time, start) and not _same(time, end)]
+        return between + ([end] if self.due(end) else [])
 
     def __repr__(self) -> str:
         return "" if self.value is None else f"when={np.array(self.value).tolist()}"
+
+
+def _same(a: float, b: float) -> bool:
+    return isclose(a, b, rel_tol=1e-12, abs_tol=1e-12)

@@ -86,7 +86,7 @@ class Attempts:
         if outcome.failure:
             return Attempt(outcome.iterations, outcome.failure)
         values = self.problem.vector.copy()
-        stages = (Stage(dt, start.time + dt, values),)
+        stages = (Stage(0.0, start.time, start.values), Stage(dt, start.time + dt, values))
         return Attempt(outcome.iterations, None, stages, values - start.values, 1.0, self.first_slope())
 
     def expected(self, start: Snapshot, end: float) -> NDArray | None:
@@ -142,7 +142,7 @@ class Attempts:
         slope = (contents - self._contents()) / dt if self.with_slopes or problem.storage.is_lumped else None
         before = past[-1][0] - past[-2][0] if guess is not None else 0.0
         difference = problem.vector - (start.values if guess is None else guess)
-        stages = (Stage(dt, end, problem.vector.copy()),)
+        stages = (Stage(0.0, start.time, start.values), Stage(dt, end, problem.vector.copy()))
         return Attempt(outcome.iterations, None, stages, difference, dt / (2 * dt + before), slope)
 
     def _runge_kutta(

@@ -48,6 +48,28 @@ class Scheme:
     def explicit_start(self) -> bool:
         return self.rows[0] == (0.0,)
 
+    def interpolation(self, share: float) -> NDArray:
+        """Weights of the start and of the stages after it that give the state at `share` of a step.
+
+        Backward Euler: on the line between the ends. With an explicit start: on the polynomial of degree 4 (of 6 stages)
+        from which the state of stage i departs by a multiple of e_i, the same for all; those at the ends by none. Stages
+        depart by x‴ Δt³ e_i, e_i = Σ_j a_ij c_j²/2 − c_i³/6, from x to fourth order; where rates are stiff by less. So
+        values between are of third order or better, those at the ends as they are.
+        """
+        if not self.explicit_start:
+            return np.array([1 - share, share])
+        powers = np.arange(len(self.rows) - 1)
+        return np.linalg.solve(self._departures, np.append(float(share) ** powers, 0.0))
+
+    @cached_property
+    def _departures(self) -> NDArray:
+        """Rows: powers of the stages' times, and e."""
+        c, count = np.array(self.times), len(self.rows)
+        rows = np.array([[*row, *(0.0,) * (count - len(row))] for row in self.rows])
+        departures = rows @ c**2 / 2 - c**3 / 6
+        departures[-1] = 0.0  # to round-off it is
+        return np.vstack([c ** np.arange(count - 1)[:, None], departures])
+
     @cached_property
     def difference(self) -> NDArray:
         """Weights of the error estimate: those of the solution less the embedded ones."""

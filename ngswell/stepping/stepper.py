@@ -225,7 +225,7 @@ class Stepper:
         return rejection, bool(power < STUCK)
 
     def _accept(self, attempt: Attempt, error: float, scheme: Scheme, dt: float, rejected: tuple[Rejection, ...]) -> Step:
-        time, old, end = self.accepted.time, self.accepted.values, attempt.stages[-1].time
+        end = attempt.stages[-1].time
         if attempt.slope is not None:
             self._slope = attempt.slope
         self._careful = max(0, self._careful - 1)
@@ -233,12 +233,10 @@ class Stepper:
         self._lumping = (self._lumping or CAREFUL) - 1 if self._lumped else 0
         self._lumping_helps |= self._lumped
         self._points = [(stage.time, stage.values) for stage in attempt.stages]
-        if not scheme.explicit_start:
-            self._points.insert(0, (time, old))
         self._sizes.passes(attempt.stages[-1].values)
         if self._wanted is not None:
             landed_short = dt < 0.999 * self._wanted
             proposed = self.control.next(dt, error, scheme.power)
             self._wanted = max(self._wanted, proposed) if landed_short else proposed
         self._keep(end)
-        return Step(end, dt, attempt.iterations, rejected, error, attempt.stages, attempt.slope)
+        return Step(end, dt, attempt.iterations, rejected, error, attempt.stages, attempt.slope, scheme)

@@ -48,7 +48,7 @@ class StepReport:
 
 @dataclass(frozen=True)
 class Step(StepReport):
-    """The same with its stages, for observers.
+    """The same with its stages, the first of which is the state that it starts from, and its scheme, for observers.
 
     `slope` is what each content falls by in unit time at the end of the step, as the scheme has it; None where only backward
     Euler's steps are taken, in which contents fall evenly.
@@ -56,6 +56,11 @@ class Step(StepReport):
 
     stages: tuple[Stage, ...] = ()
     slope: NDArray | None = None
+    scheme: Scheme = BACKWARD_EULER
+
+    def weights(self, time: float) -> NDArray:
+        """Weights of what is known at the stages that give it at a `time` [s] within the step."""
+        return self.scheme.interpolation((time - self.stages[0].time) / (self.time - self.stages[0].time))
 
     def report(self) -> StepReport:
         """Without the states of the stages."""
