@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import pickle
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from ngswell import checks
 from ngswell.analysis.one_step import Growth, growth_factor
 from ngswell.baths.bath import Bath
 from ngswell.errors import InputError
 from ngswell.observers.base import Observer
 from ngswell.observers.records import power_of_mm, product
 from ngswell.problem.discretisation import Discretisation
+from ngswell.problem.handed_on import handed_on
 from ngswell.problem.problem import Problem
 from ngswell.run.checkpoint import Checkpoint
 from ngswell.run.equilibrium import equilibrate
@@ -81,7 +83,8 @@ class Scene(Setup):
 
         `end` is a result or a snapshot of this scene, such as its state of rest. Pieces that are not given stay. Times go
         on from those of `end`; with `start=0.0` the clock of the new part starts at zero, and histories count from now.
-        What the new scene does, checkpoints and observers included, begins there.
+        What the new scene does, checkpoints and observers included, begins there. Baths in vessels that are given start
+        anew; those that stay go on.
 
         Raises InputError for a snapshot of another mesh, model or order, for a history that is over before the part begins
         or that stays although its clock changes, and for a support that holds the body elsewhere than it
@@ -90,7 +93,10 @@ class Scene(Setup):
         given = {"baths": baths, "loads": loads, "supports": supports, "charge": charge}
         snapshot = end.end if isinstance(end, Result) else end
         scene = following(self, snapshot, start, {name: piece for name, piece in given.items() if piece is not None})
-        Discretisation(scene).check("after", replace(snapshot, time=scene.start))
+        after = Discretisation(scene)
+        given_anew = () if baths is None else scene.baths
+        fresh = [number.name for bath in given_anew for number in bath.numbers(after.concentration).values()]
+        checks.set_fields(scene, origin=handed_on(snapshot, Discretisation(self), after, fresh))
         return scene
 
     def describe(self) -> str:

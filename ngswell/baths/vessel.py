@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from itertools import pairwise
+from typing import NamedTuple, cast
 
+import numpy as np
 from ngsolve import CoefficientFunction
 
 from ngswell import checks
@@ -16,6 +18,10 @@ from ngswell.schedules import Clock, Schedule, schedule
 
 VOLUMES = (1e-12, 1e12)
 """Volumes that a bath may have [mm³]."""
+
+
+PIECES = 65
+"""Points at which a history is taken between its kinks and bends."""
 
 
 class Feed(NamedTuple):
@@ -71,12 +77,37 @@ class Vessel:
         inflow, outflow, _ = self.schedules
         return any(inflow.values) or any(outflow.values)
 
+    def let_in(self, begin: float, end: float) -> float:
+        """Volume let in less that let out from `begin` to `end` [s]; by trapezia, exact for ramps."""
+        inflow, outflow, _ = self.schedules
+        marks = {begin, end, *(t for s in (inflow, outflow) for t in (*s.kinks, *s.bends) if begin < t < end)}
+        times = np.concatenate([np.linspace(a, b, PIECES) for a, b in pairwise(sorted(marks))])
+        return float(np.trapezoid([cast(float, inflow.at(t)) - cast(float, outflow.at(t)) for t in times], times))
+
     def numbers(self, boundary: str, c: float, size: float) -> dict[str, OneNumber]:
         """Its unknowns by the balance of the gel that they face: V, and c̄, `c` at the start, of natural `size` [mol/l]."""
         return {
             "fluid": OneNumber(f"volume of the bath on {boundary}", self.volume, self.volume, evolves=1e-1, positive=True),
             "cations": OneNumber(f"salt of the bath on {boundary}", size, c, evolves=1e-1, positive=True),
         }
+
+    def sums(
+        self,
+        boundary: str,
+        numbers: Mapping[str, OneNumber],
+        functions: Mapping[str, Functions],
+        area: float,
+        in_gel: Mapping[str, CoefficientFunction],
+        held: Mapping[str, float],
+    ) -> list[Term]:
+        """In place of its balances: gel and bath hold together what is `held`, by name; `in_gel` per reference volume."""
+        volume, salt = functions["fluid"].trial, functions["cations"].trial
+        terms = []
+        for balance, there in (("fluid", volume), ("cations", volume * salt)):
+            name, test = numbers[balance].name, functions[balance].test
+            terms.append(Term(name, "held by the gel", in_gel[balance] * test))
+            terms.append(Term(name, "held by the bath, less all", (there - held[name]) * test / area, boundary=boundary))
+        return terms
 
     def follow(self, clock: Clock) -> Feed:
         """Its histories at the clock's time."""

@@ -28,6 +28,11 @@ class State(SolidState):
     c: CoefficientFunction
     cfc: CoefficientFunction
 
+    @property
+    def cations(self) -> CoefficientFunction:
+        """c₊ [mol/l]."""
+        return self.c
+
     @cached_property
     def pore_pressure(self) -> CoefficientFunction:
         """p with the osmotic pressure of the charge at the point in place of the smooth field's [N/mm²].

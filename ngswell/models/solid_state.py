@@ -23,7 +23,8 @@ from ngswell.physics.solid import Deformation, extra_stress
 @refusing
 @dataclass(frozen=True)
 class SolidState:
-    """The deformed solid, of trial functions or of a result. A model adds its fields and `pore_pressure` [N/mm²]."""
+    """The deformed solid, of trial functions or of a result. A model adds its fields, `pore_pressure` [N/mm²] and with
+    ions `cations` [mol/l]."""
 
     context: FieldContext
     u: CoefficientFunction

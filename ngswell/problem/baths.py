@@ -23,11 +23,18 @@ CONDUCTANCES = {"fluid": "K", "cations": "D_plus"}
 class Baths:
     """The baths of a setup at the clock's time. `functions` are those of the numbers that pieces bring, by name.
 
-    `present` are their fields, by boundary, with what is being computed of those that are unknowns.
+    `present` are their fields, by boundary, with what is being computed of those that are unknowns. With what gel and
+    vessel have `held` together, by name of the vessel's numbers, these sums take the place of the vessel's balances.
     """
 
-    def __init__(self, discretisation: Discretisation, functions: Mapping[str, Functions], clock: Clock) -> None:
-        self._discretisation, self._functions, self._clock = discretisation, functions, clock
+    def __init__(
+        self,
+        discretisation: Discretisation,
+        functions: Mapping[str, Functions],
+        clock: Clock,
+        held: Mapping[str, float] | None,
+    ) -> None:
+        self._discretisation, self._functions, self._clock, self._held = discretisation, functions, clock, held
         self.present: dict[str, BathFields] = {}
         self._sought: dict[str, BathFields] = {}
         for bath in discretisation.setup.baths:
@@ -55,7 +62,12 @@ class Baths:
             if bath.vessel is not None:
                 numbers = bath.numbers(problem.concentration)
                 size = area(problem.mesh, kinematics, bath.boundary)
-                terms += bath.vessel.terms(bath.boundary, numbers, self._own(bath), size, self._clock)
+                on = bath.boundary, numbers, self._own(bath), size
+                if self._held is None:
+                    terms += bath.vessel.terms(*on, self._clock)
+                else:
+                    in_gel = {"fluid": state.content, "cations": state.content * state.cations}
+                    terms += bath.vessel.sums(*on, in_gel, self._held)
         return terms
 
     def loads(self, u: CoefficientFunction, v: CoefficientFunction) -> list[Term]:
@@ -82,5 +94,7 @@ class Baths:
             h=h,
             order=model.order,
             conductances={name: problem.setup.material.largest(CONDUCTANCES[name], problem.mesh) / h for name in excess},
-            receiving={balance: functions.test for balance, functions in self._own(bath).items()},
+            receiving={}
+            if self._held is not None
+            else {balance: functions.test for balance, functions in self._own(bath).items()},
         )

@@ -139,7 +139,12 @@ class Discretisation:
     @cached_property
     def meaning(self) -> dict[str, str]:
         """What coefficients are those of: equal for two scenes whose snapshots can be exchanged."""
-        spans = [f"{name} {part.start}:{part.stop}" for name, part in self.ranges.items()]
+        return {**self.fields_meaning, "numbers": ", ".join(self.numbers)}
+
+    @cached_property
+    def fields_meaning(self) -> dict[str, str]:
+        """The same of the unknowns that are fields."""
+        spans = [f"{name} {part.start}:{part.stop}" for name, part in self.ranges.items() if name not in self.numbers]
         multipliers = [bath.boundary for bath, treatment in self.setup.weak_baths if treatment.multipliers]
         return {
             "mesh": f"{self.mesh.ne} cells, {self.mesh.nv} vertices, {self.setup.mesh_digest[:12]}",
@@ -226,7 +231,10 @@ class Discretisation:
         bath = None
         if setup.baths:
             first = setup.baths[0]
-            bath = BathFields(None if first.salt is None else CF(first.salt.at(time)), CF(first.hydraulic.at(time)))
+            salt = None if first.salt is None else CF(first.salt.at(time))
+            if number := first.numbers(self.concentration).get("cations"):
+                salt = fields.components[self.names.index(number.name)]
+            bath = BathFields(salt, CF(first.hydraulic.at(time)))
         weight = None if setup.fluid_weight is None else followed(setup.fluid_weight, Clock(time))
         context = FieldContext(setup.material, self.kinematics, setup.charge.at(time), weight, bath)
         return self.model.state(fields.components[: len(self.model.unknowns)], context)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import cached_property
 
 import numpy as np
@@ -35,10 +36,10 @@ class Problem(Discretisation):
 
     S the contents (terms of kind RATE), R everything else. S(x_old) is a vector computed once a step, so no form sees an
     old state. Linearisations are NGSolve's. The fields of a problem are those of what is being computed with it; results
-    are snapshots.
+    are snapshots. What gel and vessels have `held` together stays, if it is given (for states of rest).
     """
 
-    def __init__(self, setup: Setup) -> None:
+    def __init__(self, setup: Setup, held: Mapping[str, float] | None = None) -> None:
         super().__init__(setup)
         self.fields = GridFunction(self.space)
         self.dt = Parameter(1.0)
@@ -51,7 +52,7 @@ class Problem(Discretisation):
             for at, name in enumerate(self.names)
             if name in self.numbers
         }
-        baths = Baths(self, numbers, self.clock)
+        baths = Baths(self, numbers, self.clock, held)
         self.baths = baths.present
         """The baths at the clock's time, by boundary."""
         first = next(iter(self.baths.values()), None)

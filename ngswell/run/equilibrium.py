@@ -14,6 +14,7 @@ from ngswell.baths.treatment import Charge
 from ngswell.errors import UNCONVERGED, Failure, InputError, Reason, StepError
 from ngswell.observers.base import Observer
 from ngswell.problem.problem import Problem
+from ngswell.problem.vessels import among_themselves, together
 from ngswell.run.guard import Guard
 from ngswell.run.watch import Watch
 from ngswell.schedules import LARGEST
@@ -55,7 +56,8 @@ def equilibrate(
     The stationary balances are solved by continuation: from the uncharged body, already loaded, the charge is raised as
     fast as Newton's method follows. Where that ends early, as under a load that only the charged body can bear, the body
     relaxes from its initial state instead, in steps of backward Euler that grow as fast as Newton's method follows. Works
-    for fields of position and constrained bodies. A body squeezed dry, where nothing flows any more, is not at rest.
+    for fields of position and constrained bodies. A bath in a vessel comes to rest with what it and the body hold
+    together at the start. A body squeezed dry, where nothing flows any more, is not at rest.
     `observers` record the state of rest. Raises InputError for a sealed body
     (what it holds is not determined by balances) and for treatments that remember the past, and StepError when neither way
     reaches the state of rest; `end` of the error is the initial state.
@@ -64,29 +66,45 @@ def equilibrate(
     time = setup.start if time is None else checks.number("equilibrate: time", time, "s", -LARGEST, LARGEST)
     if not setup.baths:
         raise InputError("equilibrate: the body is sealed, so its content at rest is not determined; give it a bath")
-    for bath in setup.baths:
-        if bath.vessel is not None:
-            raise InputError(
-                f"equilibrate: the bath on {bath.boundary!r} is in a vessel, and what it ends with is what it started with "
-                "and gained on the way: run until it rests"
-            )
     for bath, treatment in setup.prescribed_baths:
         if treatment.charge_of is not Charge.PRESENT:
             raise InputError(f"equilibrate: the bath on {bath.boundary!r} remembers the past ({treatment})")
     setup.check_unchanged()
     watch, problem, method = Watch(observers), Problem(setup), newton or DampedNewton()
     watch.plan(time, time)
-    rest = _Rest(problem, time, method, Factorisation(solver(problem), method.slowest))
+    solved = _with_sums(problem)
+    rest = _Rest(solved, time, method, Factorisation(solver(solved), method.slowest))
     failed = rest.raise_charge()
     if failed is not None and not rest.relax():
         raise failed
-    problem.set_time(time)
+    problem.restore(solved.snapshot(time))
     with watch:
         watch.start(problem, time, time, time)
-    Guard(unstable, watch, problem, rest.factorisation.solver, LONGEST).at_end(time)
+    solved.set_time(time)
+    Guard(unstable, watch, solved, rest.factorisation.solver, LONGEST).at_end(time)
     rested = problem.snapshot(time)
     warn_of_overlap(problem, rested)
     return rested
+
+
+def _with_sums(problem: Problem) -> Problem:
+    """The problem, or where a bath is in a vessel one in which gel and bath hold together what they hold at the start.
+
+    Refuses vessels whose state of rest more decides than these sums.
+    """
+    setup = problem.setup
+    vessels = [bath for bath in setup.baths if bath.vessel is not None]
+    if not vessels:
+        return problem
+    if not among_themselves(problem) or any(bath.vessel.fed for bath in vessels if bath.vessel):
+        raise InputError(
+            f"equilibrate: the bath on {vessels[0].boundary!r} is in a vessel, and other baths, what is let in or out or a "
+            "load that drives flow change what it ends with on the way: run until it rests"
+        )
+    problem.initialise()
+    if setup.origin is not None:
+        problem.restore(setup.origin)
+    return Problem(setup, together(problem))
 
 
 class _Rest:

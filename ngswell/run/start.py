@@ -8,6 +8,7 @@ from ngswell import checks
 from ngswell.errors import InputError
 from ngswell.files import Tree
 from ngswell.problem.problem import Problem
+from ngswell.problem.vessels import among_themselves, together
 from ngswell.run.checkpoint import Checkpoint
 from ngswell.run.restart import Restart
 from ngswell.run.watch import Watch
@@ -75,9 +76,24 @@ class Start:
         return ((), {}) if self.restart is None else (self.restart.steps, self.restart.log)
 
     def apply(self, problem: Problem) -> None:
-        """Put the fields where the run starts."""
+        """Put the fields where the run starts. Refuses a vessel that runs dry whatever the body does."""
         if self.snapshot is not None:
             problem.check("resume", self.snapshot)
         problem.initialise()
         if self.snapshot is not None:
             problem.restore(self.snapshot)
+        self._check_vessels(problem)
+
+    def _check_vessels(self, problem: Problem) -> None:
+        """A bath that is the only one cannot lose more than it and the body hold."""
+        setup = problem.setup
+        for bath in setup.baths:
+            if bath.vessel is None or not among_themselves(problem):
+                continue
+            name = bath.numbers(problem.concentration)["fluid"].name
+            left = together(problem)[name] + bath.vessel.let_in(self.time, self.until)
+            if not left > 0:
+                raise InputError(
+                    f"vessel on {bath.boundary!r}: until {self.until:g} s more is let out than bath and body hold at the "
+                    f"start and what is let in, by {-left:g} of its volume's unit: less outflow, or a shorter run"
+                )

@@ -119,6 +119,16 @@ def test_a_column_in_a_beaker_ends_where_what_both_hold_is_conserved(model, volu
     assert abs(homogeneous_equilibrium(TABLE_1, c, "confined", load=P0).J - J) > 1e-3
 
 
+@pytest.mark.parametrize(("model", "treatment"), TREATMENTS)
+def test_the_state_of_rest_in_a_beaker_is_found_at_once(model, treatment):
+    ledger = Ledger()
+    scene = gel(Vessel(0.2), 1e-3, model, treatment, cells=2)
+    J, salt = end_of_column(0.2, 1e-3)
+    assert scene.state(scene.equilibrate(observers=[ledger])).at((0.2,), "J") == pytest.approx(J, rel=1e-10)  # round-off
+    assert ledger.bath_c["top"][-1] == pytest.approx(salt, rel=1e-10)
+    assert ledger.bath_fluid["top"][-1] == pytest.approx(0.2 - HEIGHT * (J - 1), rel=1e-10)
+
+
 MOTIONS = [
     (PlaneStrain(), rectangle(0.5, 0.4, 2, 2), [Roller("bottom", "y"), Roller("left", "x")], "top|right", 0.3, 0.2),
     (Axisymmetric(), rectangle(0.5, 0.4, 2, 2), [Roller("bottom", "z"), Roller("left", "r")], "top|right", 0.5, 0.1 * pi),
@@ -139,6 +149,9 @@ def test_a_free_body_in_a_beaker_conserves_its_fluid_and_salt(motion, mesh, supp
     assert max(ledger.imbalance().values()) < 1e-11
     assert ledger.fluid[0] == pytest.approx(0.75 * body, rel=1e-12)
     assert ledger.bath_fluid[boundary][0] == pytest.approx(volume, rel=1e-12)
+    scene.run(1e7, Adaptive(1e-1), [ending := Ledger()], unstable="off")
+    scene.equilibrate(1e7, observers=[rested := Ledger()], unstable="off")
+    assert rested.bath_c[boundary][-1] == pytest.approx(ending.bath_c[boundary][-1], rel=1e-6)  # of the run's solves
     swollen = ledger.fluid[-1] - ledger.fluid[0]
     assert swollen > 1e-2 * body
     assert ledger.bath_fluid[boundary][-1] == pytest.approx(volume - swollen, rel=1e-11)
