@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from math import prod
 from typing import Any
 
@@ -15,13 +16,16 @@ from numpy.typing import NDArray
 from ngswell import checks
 from ngswell.errors import InputError
 from ngswell.mesh.soundness import check_mesh
-from ngswell.mesh.spacing import Grade, Lines, Regions, coordinates, places, with_regions
+from ngswell.mesh.spacing import Grade, Lines, Regions, coordinates, places, thinnings, with_regions
 
 SIZES = (1e-6, 1e6)
 """Sizes that a body may have [mm]."""
 
 MOST_CELLS = 10**7
 """Cells that a mesh may have."""
+
+MOST_THINNING = 100.0
+"""Ratio that `grade` may have on a shape, whose thin cells are thin in all directions."""
 
 
 def column(
@@ -138,12 +142,13 @@ def box(
     return with_regions("box", mesh, at, regions)
 
 
-def from_occ(shape: Any, maxh: float, order: int = 1, quads: bool = False) -> Mesh:
+def from_occ(shape: Any, maxh: float, order: int = 1, quads: bool = False, grade: Grade | None = None) -> Mesh:
     """Mesh a shape of `netgen.occ` in mm: a face in the plane z = 0 with named edges, or a solid with named faces.
 
     `maxh` is the largest cell size [mm]; the cells follow curved sides with polynomials of `order`, best the
     displacement's. `quads` meshes a face with quadrilaterals where it can, with triangles where it cannot. Unnamed sides
-    are sealed and free.
+    are sealed and free. `grade={"rim": 10}` asks for cells a tenth of `maxh` at the sides of that name; they are thin in all
+    directions, so that their number grows with the ratio, on a solid with its square.
 
         disc = WorkPlane().Circle(2.0).Face()
         disc.edges.name = "rim"
@@ -163,11 +168,26 @@ def from_occ(shape: Any, maxh: float, order: int = 1, quads: bool = False) -> Me
     check_named("from_occ", names, f"name some of the shape's {sides}, shape.{sides}.name = 'rim'")
     if not solid:
         check_plane("from_occ", np.array([vertex.p[2] for vertex in shape.vertices]))
-    geometry = OCCGeometry(shape) if solid else OCCGeometry(shape, dim=2)
-    mesh = Mesh(geometry.GenerateMesh(maxh=maxh, quad_dominated=quads))
+    thin = thinnings("from_occ", grade, sorted({*names} - {""}), MOST_THINNING)
+    with _thinned(getattr(shape, sides), maxh, thin):
+        geometry = OCCGeometry(shape) if solid else OCCGeometry(shape, dim=2)
+        mesh = Mesh(geometry.GenerateMesh(maxh=maxh, quad_dominated=quads))
     mesh.Curve(order)
     check_mesh(mesh)
     return mesh
+
+
+@contextmanager
+def _thinned(sides: Iterable[Any], maxh: float, thin: dict[str, float]) -> Iterator[None]:
+    """Largest cells [mm] at sides of a shape, by their names, for the time being: the shape is the caller's."""
+    before = [(side, side.maxh) for side in sides if side.name in thin]
+    try:
+        for side, own in before:
+            side.maxh = min(own, maxh / thin[side.name])
+        yield
+    finally:
+        for side, own in before:
+            side.maxh = own
 
 
 def check_named(what: str, names: Iterable[str], remedy: str) -> None:

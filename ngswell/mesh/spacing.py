@@ -45,12 +45,7 @@ def coordinates(
 ) -> list[list[float]]:
     """Node coordinates [mm] along each of the `axes` from `start`; their two ends are named in `sides`."""
     names = [name for pair in sides for name in pair]
-    ratios = dict.fromkeys(names, 1.0)
-    for name, ratio in _by_name(f"{what}: grade", grade, {names[-1]: 10.0}):
-        checks.choice(f"{what}: grade: boundary", name, names)
-        ratios[name] = checks.number(
-            f"{what}: grade at {name!r}", ratio, low=1.0, high=1e6, hint="it is largest over smallest cell"
-        )
+    ratios = dict.fromkeys(names, 1.0) | thinnings(what, grade, names, 1e6)
     nodes = {
         axis: _nodes(start, size, number, ratios[low], ratios[high])
         for axis, size, number, (low, high) in zip(axes, sizes, cells, sides, strict=False)
@@ -58,6 +53,16 @@ def coordinates(
     for axis, at in lines.items():
         nodes[axis] = _through(f"{what}: lines", axis, nodes[axis], at)
     return list(nodes.values())
+
+
+def thinnings(what: str, grade: Grade | None, names: list[str], most: float) -> dict[str, float]:
+    """How many times thinner cells are at the boundaries that `grade` names, from 1 to `most`."""
+    found = {}
+    for name, ratio in _by_name(f"{what}: grade", grade, {names[-1]: 10.0}):
+        checks.choice(f"{what}: grade: boundary", name, names)
+        hint = "it is largest over smallest cell"
+        found[name] = checks.number(f"{what}: grade at {name!r}", ratio, low=1.0, high=most, hint=hint)
+    return found
 
 
 def with_regions(what: str, mesh: Mesh, lines: dict[str, list[float]], regions: Regions | None, axes: str = "xyz") -> Mesh:

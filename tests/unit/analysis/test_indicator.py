@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
-from netgen.occ import Glue, WorkPlane, Y
+from netgen.occ import Glue, WorkPlane, X, Y
 from ngsolve import CF, ET, VOL, Grad, InnerProduct, Integrate, grad, sqrt, x, y, z
 
 from ngswell import (
+    TABLE_1,
     TABLE_2,
     Axisymmetric,
     Bath,
@@ -23,6 +24,7 @@ from ngswell import (
     Roller,
     Scene,
     Spatial,
+    Symmetry,
     Uncharged,
     box,
     column,
@@ -242,6 +244,31 @@ def test_the_observer_keeps_the_largest_error_of_each_cell():
 
     with pytest.raises(InputError, match="make a new one for each run"):
         watched.run(125.0, Fixed(25.0), [coarseness], resume=result.end)
+
+
+def test_its_advice_can_be_followed_on_a_shape():
+    """A disc whose bath falls fast. `grade` at the rim is worth more than as many cells everywhere."""
+    disc = WorkPlane().Circle(1.0).Face() * WorkPlane().Rectangle(1, 1).Face()
+    disc.edges.name = "rim"
+    disc.edges.Min(Y).name, disc.edges.Min(X).name = "bottom", "left"
+
+    def error(maxh, grade=None):
+        mesh = from_occ(disc, maxh, order=2, grade=grade)
+        coarseness = Coarseness()
+        body = Scene(
+            mesh=mesh, kinematics=PlaneStrain(), material=TABLE_1, supports=[Symmetry("left"), Symmetry("bottom")],
+            baths=[Bath("rim", c=Ramp((0, 1.0), (5, 0.8)))], initial=(1.0, 0.0), charge=Ramp((0, 0.0)),
+        )  # fmt: skip
+        body.run(20.0, Fixed(5.0), [coarseness])
+        return coarseness.total.max(), mesh.ne, coarseness.report()
+
+    coarse, _, report = error(0.15)
+    assert "Thinner cells along rim" in report
+    graded, cells, _ = error(0.15, {"rim": 6})
+    even, more, _ = error(0.055)
+    assert cells < 0.7 * more
+    # Measured 35 % with 74 cells, 16 % with 346 of them graded, 20 % with 591 of one size.
+    assert graded < 0.9 * even < 0.9 * coarse
 
 
 def test_a_body_at_rest_has_nothing_to_resolve():

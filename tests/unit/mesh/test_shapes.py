@@ -154,6 +154,9 @@ def test_ungraded_is_uniform():
         (lambda: from_occ(named_disc().Move((0, 0, 1)), 0.5), "z = 1 mm"),
         (lambda: from_occ(named_disc().edges[0], 0.5), "neither a solid nor a face"),
         (lambda: from_occ(named_box(), 0.5, quads=True), "quads"),
+        (lambda: from_occ(named_disc(), 0.5, grade={"top": 3}), "'top' is none of 'rim'"),
+        (lambda: from_occ(named_disc(), 0.5, grade={"rim": 1e3}), "grade at 'rim' = 1000 is outside 1 … 100"),
+        (lambda: from_occ(named_disc(), 0.5, grade=3), "grade has to be a dictionary"),
     ],
 )
 def test_bad_sizes_and_shapes(make, words):
@@ -171,6 +174,24 @@ def named_box():
     shape = Box((0, 0, 0), (1, 1, 1))
     shape.faces.name = "side"
     return shape
+
+
+@pytest.mark.parametrize(("make", "quads"), [(named_disc, False), (named_disc, True), (named_box, False)])
+def test_cells_of_a_shape_are_thinned_at_its_sides(make, quads):
+    shape, side = make(), "rim" if make is named_disc else "top"
+    if side == "top":
+        shape.faces.Max(Z).name = "top"
+
+    def at_side(mesh):
+        sides = [np.array([mesh[vertex].point for vertex in e.vertices]) for e in mesh.Boundaries(side).Elements()]
+        return max(np.linalg.norm(corners[0] - corners[1]) for corners in sides)
+
+    plain, thin = from_occ(shape, 0.5, quads=quads), from_occ(shape, 0.5, quads=quads, grade={side: 5})
+    assert at_side(plain) > 0.3
+    assert at_side(thin) < 2 * 0.1
+    largest = max(np.ptp([thin[v].point for v in e.vertices], axis=0).max() for e in thin.Elements(VOL))
+    assert largest > 0.25  # inside they stay large
+    assert from_occ(shape, 0.5, quads=quads).ne == plain.ne  # the shape is as it was
 
 
 def test_two_materials_of_one_shape():
