@@ -315,3 +315,19 @@ def test_a_transient_across_the_kink_comes_to_rest():
     still = scene.state(scene.equilibrate(1e5, unstable="off"))
     # both solve the same balance; what is left of the transient is below the tolerance of the steps
     assert end.at((0.5, 0.5), "J") == pytest.approx(still.at((0.5, 0.5), "J"), rel=1e-3)
+
+
+@pytest.mark.parametrize("families", [[(1, 0, 0), (0, 0, 1)], [(1, 0, 0), (0, 0, 1), (0, 1, 0)]])
+def test_rest_across_the_kink_under_a_prescribed_displacement(families):
+    """An unconfined cylinder shortened by a tenth: radial and hoop fibres go taut, those along the axis slacken."""
+    material = replace(DRAINED, solid=FibreReinforced(NeoHookean(), [Fibres(N, 100.0) for N in families]))
+    press = Roller("top", "z", displacement=Ramp((0, 0.0), (100, -0.1)))
+    scene = Scene(
+        mesh=rectangle(1, 1, 2, 2), kinematics=Axisymmetric(), material=material, model=Uncharged(),
+        supports=[Roller("left", "r"), Roller("bottom", "z"), press], baths=[Bath("right")],
+    )  # fmt: skip
+    found = scene.state(scene.equilibrate(100.0)).at((0.4, 0.4), "J")
+    low, high = 1.0, 1.1
+    while low < (middle := (low + high) / 2) < high:
+        low, high = (middle, high) if nominal(np.diag([middle, 0.9, middle]), material)[0, 0] < 0 else (low, middle)
+    assert found == pytest.approx(0.9 * low**2, rel=1e-8)  # Newton's tolerance
