@@ -10,6 +10,7 @@ from ngsolve import ELEMENT, VOL, BaseMatrix, BaseVector, BitArray, NodeId
 from ngsolve.krylovspace import GMResSolver
 from numpy.typing import NDArray
 
+from ngswell.errors import InputError
 from ngswell.problem.problem import Problem
 from ngswell.solve.direct import LinearSolver
 
@@ -39,12 +40,14 @@ class TwoLevelSolver(LinearSolver):
 
     Where facets have no functions of their own (tetrahedra of order 2), the larger level is the whole system.
 
-    GMRES measures each field in units of its reference (`Problem.references`).
+    GMRES measures each field in units of its reference (`Problem.references`). Raises InputError for a body in 1-d.
     """
 
     direct = False
 
     def __init__(self, problem: Problem) -> None:
+        if problem.mesh.dim == 1:
+            raise InputError("TwoLevelSolver is for bodies in the plane and in space; leave solver= out for a column")
         super().__init__(problem.free)
         self.iterations = 0  # of the last solve
         self._patches, self._levels = _patches(problem), _coarse_levels(problem)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from ngsolve import x
 
+from examples.extend_load import Springs
 from ngswell import (
     TABLE_1,
     TABLE_2,
@@ -21,6 +22,7 @@ from ngswell import (
     InputError,
     Lagged,
     LocalDonnan,
+    Material,
     Penalty,
     Pin,
     PlaneStrain,
@@ -33,16 +35,18 @@ from ngswell import (
     Scene,
     Spatial,
     Spherical,
-    Stability,
     StepError,
     Symmetry,
     Traction,
     TwoLevelSolver,
+    Uncharged,
     box,
     column,
     rectangle,
 )
+from ngswell.analysis.perturbations import Perturbations
 from ngswell.closed_forms.homogeneous import homogeneous_equilibrium
+from ngswell.problem.problem import Problem
 from studies.limits.verification import quarter_disc
 
 BALANCED = 1e-10
@@ -179,7 +183,7 @@ def test_on_a_column_it_is_a_dead_load(steps, model):
 
 
 def test_perturbations_move_it():
-    """The factor of growth of the lagged column, platen and dead load alike; and stable states are found stable."""
+    """The factor of growth of the lagged column, platen and dead load alike."""
     lagged = {
         "model": Concentration(),
         "baths": [Bath("top", c=0.15, treatment=Lagged(InnerLayer()))],
@@ -190,9 +194,38 @@ def test_perturbations_move_it():
     assert abs(one + 0.1) > 1e-3
     held = replace(pushed(True, **lagged), supports=[Roller("bottom|top", "x")])
     assert abs(held.growth_factor(1e-3).factor - other) > 1e-2  # control: where the platen does not move
-    watch = Stability(over=1e4)
-    pushed(True).equilibrate(100.0, observers=[watch])
-    assert list(watch.rates) == [0.0]
+
+
+def fastest(scene):
+    """Rate of the fastest perturbation of the initial state [1/s]; 0 where none grows."""
+    problem = Problem(scene)
+    problem.initialise()
+    found = Perturbations(problem).fastest(1e-9)
+    return 0.0 if found is None else found.rate
+
+
+def repelled(cells, *supports, **changes):
+    """A column of 1 mm with springs that push the further its end is from where it began, more than it bears by itself."""
+    return Scene(
+        **{
+            "mesh": column(1.0, cells), "kinematics": Confined(), "supports": [Roller("bottom", "x"), *supports],
+            "material": Material(mu=0.24, lam=0.16, nS0=0.25, K=1e-3), "model": Uncharged(), "baths": [Bath("bottom")],
+            "loads": [Springs("top", Ramp((0, -0.7)))], **changes,
+        }
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("glued", [False, True])
+def test_a_platen_runs_away_like_a_free_end(glued):
+    # s u = c_v u″ + s u(1), M u′(0) = 0.7 u(1), drained at 0: s = c_v k² with M k coth k = 0.7, M = 2µ + λ = 0.64 N/mm².
+    free = [fastest(repelled(cells)) for cells in (4, 8)]
+    assert (4 * free[1] - free[0]) / 3 == pytest.approx(1.834111547e-4, rel=1e-4)  # the error goes with h²
+    walls = [Roller("bottom", "y"), Roller("left|right", "x")]
+    slab = {"mesh": rectangle(1.0, 1.0, 3, 4), "kinematics": PlaneStrain()}
+    carried = repelled(4, supports=[*walls, Platen("top", force=0.0, glued=glued)], **slab)
+    assert fastest(carried) == pytest.approx(free[0], rel=1e-8)
+    assert carried.growth_factor(1.0).factor == pytest.approx(1 / (1 - free[0]), rel=1e-8)
+    assert fastest(repelled(4, supports=[*walls, Roller("top", "y")], **slab)) == 0.0  # control: held
 
 
 def test_checkpoints_and_solvers(tmp_path):
@@ -203,6 +236,8 @@ def test_checkpoints_and_solvers(tmp_path):
     flat = block(Platen("top", force=-0.1), charge=WEAK)
     one, other = (flat.run(5.0, Fixed(1.0), unstable="off", **solver).end for solver in ({}, {"solver": TwoLevelSolver}))
     assert np.abs(one.values - other.values).max() < 1e-7  # Newton's tolerance
+    with pytest.raises(InputError, match="leave solver= out for a column"):  # it ended in a MemoryError, or not at all
+        scene.run(20.0, Fixed(1.0), solver=TwoLevelSolver)
     with pytest.raises(InputError, match="supports"):
         replace(scene, supports=[Roller("bottom", "x"), Platen("top", force=-0.4)]).run(30.0, checkpoint=kept)
 
