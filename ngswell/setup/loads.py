@@ -55,8 +55,9 @@ class Traction(Load):
 
     Each component of `vector` is a number or a history, `(0.0, Ramp((0, 0.0), (60, -0.02)))`; a `Blend` varies in space.
     An `effective` traction is what the solid alone bears: the pore pressure p at the boundary, osmotic pressure included,
-    adds its −p n per current area. Raises InputError for values beyond ±1e3, in directions in which a support holds the
-    boundary, and for an effective traction where a bath presses as well.
+    adds its −p n per current area. A bath there has to give p: with a given flow in its place, or none, p and its gradient
+    are both given on one side, from which diffusion does not follow. Raises InputError without one, where a bath presses
+    as well, for values beyond ±1e3, and in directions in which a support holds the boundary.
     """
 
     boundary: str
@@ -79,6 +80,13 @@ class Traction(Load):
             for name in names:
                 if any(_values(entry)) and name in fixed[direction].split("|"):
                     raise InputError(f"Traction on {name!r}: a support holds it in {direction}, so it has no effect")
+        wet = {name for bath in surroundings.baths for name in bath.boundary.split("|")}
+        for name in names if self.effective else ():
+            if name not in wet:
+                raise InputError(
+                    f"Traction on {name!r}: it is effective, and no bath gives the pore pressure there, so nothing fixes "
+                    "the motion; give that boundary a Bath, or the traction on solid and fluid together, effective=False"
+                )
         for bath in surroundings.baths if self.effective else ():
             if {*names} & {*bath.boundary.split("|")} and any(bath.hydraulic.values) and not bath.porous_plate:
                 raise InputError(

@@ -175,6 +175,16 @@ def test_an_effective_traction_is_the_extra_stress_in_every_bath(c):
     assert homogeneous_response(TABLE_1, 1)(J - TABLE_1.number("nS0")) == pytest.approx(-0.1, rel=1e-9)  # dψ/dJ
 
 
+@pytest.mark.parametrize("others", [(), (Efflux("bottom", fluid=-1e-4),)], ids=["sealed", "given flux"])
+def test_an_effective_traction_without_a_bath_is_refused(others):
+    """Such runs ended after 0.2 s on 3, 5e-2 s on 6 and 3e-4 s on 10 cells, whatever their steps: ill-posed."""
+    with pytest.raises(InputError, match="'bottom': it is effective, and no bath gives the pore pressure"):
+        Scene(
+            mesh=column(1.0, 3), kinematics=Confined(), material=TABLE_1, supports=[Roller("top", "x")],
+            baths=[Bath("top", c=0.15)], loads=[Traction("bottom", (0.0,), effective=True), *others],
+        )  # fmt: skip
+
+
 def test_an_effective_traction_beside_the_pressure_of_a_bath_is_refused():
     with pytest.raises(InputError, match="porous_plate"):
         stiff(Potential(), Traction("top", (0.0,), effective=True), baths=[Bath("top", c=0.1, P=0.1)])
