@@ -39,8 +39,9 @@ class Vessel:
         dV/dt = efflux of fluid from the gel + inflow − outflow,
         d(V c̄)/dt = efflux of cations from the gel + inflow c_in − outflow c̄.
 
-    `volume` is V at the start, `inflow` and `outflow` are rates per second, numbers or histories; [mm³] on solids and
-    axisymmetric bodies (whole turns), [mm²] per thickness in plane strain, [mm] per area in a column. `c_in` is the salt
+    `volume` is V at the start, `inflow` and `outflow` are rates per second, numbers or histories; [mm³] on solids, beads
+    and axisymmetric bodies (whole turns), [mm²] per thickness in plane strain and per length of a cylinder, [mm] per area in
+    a column. `c_in` is the salt
     concentration of what comes in [mol/l]. Raises InputError for volumes below 1e-12 or beyond 1e12, for rates that are
     negative, and for an inflow without a concentration.
     """

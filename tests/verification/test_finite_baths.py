@@ -1,5 +1,6 @@
 """Baths of finite volume: the state they end in, the way there, and what gel and bath hold together."""
 
+from dataclasses import replace
 from math import pi, tan
 
 import numpy as np
@@ -13,6 +14,7 @@ from ngswell import (
     Bath,
     Concentration,
     Confined,
+    Cylindrical,
     DampedNewton,
     Fixed,
     Ledger,
@@ -22,10 +24,12 @@ from ngswell import (
     Penalty,
     PlaneStrain,
     Potential,
+    Problem,
     Ramp,
     Roller,
     Scene,
     Spatial,
+    Spherical,
     Traction,
     TwoLevelSolver,
     Vessel,
@@ -33,6 +37,7 @@ from ngswell import (
     column,
     rectangle,
 )
+from ngswell.analysis.perturbations import Perturbations
 from ngswell.closed_forms.homogeneous import homogeneous_equilibrium
 from ngswell.physics import donnan
 from tests.scenes import P0
@@ -155,6 +160,40 @@ def test_a_free_body_in_a_beaker_conserves_its_fluid_and_salt(motion, mesh, supp
     swollen = ledger.fluid[-1] - ledger.fluid[0]
     assert swollen > 1e-2 * body
     assert ledger.bath_fluid[boundary][-1] == pytest.approx(volume - swollen, rel=1e-11)
+
+
+@pytest.mark.parametrize(("motion", "volume", "body"), [(Spherical(), 3.0, 4 * pi / 3), (Cylindrical(), 3.0, pi)])
+def test_a_bead_in_a_beaker_comes_to_rest_as_its_closed_form(motion, volume, body):
+    # Volumes of the beaker are those of the whole bead, and per length of a cylinder. Homogeneous: Newton's tolerance.
+    ledger = Ledger()
+    scene = Scene(
+        mesh=column(1.0, 3), kinematics=motion, material=TABLE_1, supports=[Roller("bottom", "r")],
+        baths=[Bath("top", c=0.3, vessel=Vessel(volume))], initial=(BEFORE, 0.0),
+    )  # fmt: skip
+    scene.equilibrate(observers=[ledger])
+    free = "3-d" if motion == Spherical() else "plane strain"
+    rest = homogeneous_equilibrium(TABLE_1, ledger.bath_c["top"][-1], free)
+    assert ledger.fluid[-1] == pytest.approx(body * (rest.J - 0.25), rel=1e-8)
+    assert ledger.bath_fluid["top"][-1] == pytest.approx(volume - body * (rest.J - 1), rel=1e-8)
+    held = volume * 0.3 + body * 0.75 * donnan.cations(BEFORE, TABLE_1.number("cfc0"))
+    assert ledger.cations[-1] + ledger.bath_cations["top"][-1] == pytest.approx(held, rel=1e-10)
+
+
+def test_wrinkles_grow_in_a_beaker_as_in_an_infinite_bath():
+    # They take as much fluid here as they give there, so that the vessel sees nothing of them: to inverse iteration's 1e-8.
+    def rate(vessel):
+        scene = Scene(
+            mesh=rectangle(0.4, 0.5, 4, 5), kinematics=PlaneStrain(), material=replace(TABLE_1, mu=0.1),
+            supports=[Roller("bottom", "y"), Roller("left|right", "x")], loads=[Traction("top", (0.0, -P0))],
+            baths=[Bath("top", c=BEFORE, treatment=Penalty(relative=1e4), vessel=vessel)],
+        )  # fmt: skip
+        problem = Problem(scene)
+        problem.initialise()
+        return Perturbations(problem).fastest(1e-6).rate
+
+    infinite = rate(None)
+    assert infinite > 1e-2
+    assert [rate(Vessel(volume)) for volume in (1.0, 1e-3)] == pytest.approx([infinite] * 2, rel=1e-8)
 
 
 def test_the_two_level_solver_takes_a_beaker():

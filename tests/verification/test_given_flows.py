@@ -28,6 +28,7 @@ from ngswell import (
     Roller,
     Scene,
     Sine,
+    Spherical,
     Traction,
     Uncharged,
     UnitsWarning,
@@ -147,6 +148,7 @@ SIDES = [Roller("bottom", "y"), Roller("left", "x")]
         (Confined(), column(1.0, 3), [Roller("bottom", "x")], "top"),
         (PlaneStrain(), rectangle(1.0, 1.0, 2, 2), SIDES, "top|right"),
         (Axisymmetric(), rectangle(1.0, 1.0, 2, 2), [Roller("bottom", "z"), Roller("left", "r")], "top|right"),
+        (Spherical(), column(1.0, 3), [Roller("bottom", "r")], "top"),
     ],
 )
 def test_a_solid_without_traction_of_its_own_does_not_swell(model, motion, mesh, supports, boundary):
