@@ -50,6 +50,7 @@ from ngswell.observers.reaction import Reaction
 from ngswell.observers.sampling import Area, Integral, Probe, Snapshots
 from ngswell.observers.stability import Stability
 from ngswell.observers.vtk import VTK
+from ngswell.physics.anisotropy import Orthotropic, TransverselyIsotropic
 from ngswell.physics.elastic import HolmesMowSolid, LogNeoHookean, MooneyRivlin
 from ngswell.physics.fibres import FibreDistribution, FibreReinforced, Fibres
 from ngswell.physics.kinematics import Axisymmetric, Confined, PlaneStrain, Spatial
@@ -84,12 +85,13 @@ __all__ = [
     "Essential", "ExtrapolationWarning", "FibreDistribution", "FibreReinforced", "Fibres", "Fixed", "Frozen", "HolmesMow",
     "HolmesMowSolid", "InnerLayer", "InputError", "InstabilityError", "InstabilityWarning", "Integral", "Lagged",
     "LeastSquares", "Ledger", "Load", "LocalDonnan", "LogNeoHookean", "MPa", "MackieMeares", "Material", "MooneyRivlin",
-    "Multiplier", "NeoHookean", "NgswellError", "Nitsche", "Observer", "Outflow", "OutputError", "OverlapWarning", "Penalty",
-    "Pin", "PlaneStrain", "Platen", "Potential", "PowerLaw", "Prescribed", "Pressure", "Probe", "Problem", "Progress",
-    "Ramp", "Reaction", "Reason", "Restart", "Result", "Role", "Roller", "Scene", "Setup", "Sine", "Snapshot", "Snapshots",
-    "Spatial", "Spherical", "Spline", "Stability", "StepError", "Support", "Symmetry", "Term", "Traction", "TwoLevelSolver",
-    "Uncharged", "UnitsWarning", "Vessel", "Weak", "Weight", "box", "by_region", "check_mesh", "column", "day", "from_occ",
-    "hour", "kPa", "metre", "micrometre", "ray", "read_checkpoint", "read_mesh", "rectangle", "year",
+    "Multiplier", "NeoHookean", "NgswellError", "Nitsche", "Observer", "Orthotropic", "Outflow", "OutputError",
+    "OverlapWarning", "Penalty", "Pin", "PlaneStrain", "Platen", "Potential", "PowerLaw", "Prescribed", "Pressure", "Probe",
+    "Problem", "Progress", "Ramp", "Reaction", "Reason", "Restart", "Result", "Role", "Roller", "Scene", "Setup", "Sine",
+    "Snapshot", "Snapshots", "Spatial", "Spherical", "Spline", "Stability", "StepError", "Support", "Symmetry", "Term",
+    "Traction", "TransverselyIsotropic", "TwoLevelSolver", "Uncharged", "UnitsWarning", "Vessel", "Weak", "Weight", "box",
+    "by_region", "check_mesh", "column", "day", "from_occ", "hour", "kPa", "metre", "micrometre", "ray", "read_checkpoint",
+    "read_mesh", "rectangle", "year",
 ]  # fmt: skip
 
 for _name in __all__:

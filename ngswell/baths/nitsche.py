@@ -88,5 +88,4 @@ class Nitsche(Weak):
 
 def _driven(state: Any, of_p: CoefficientFunction, of_c: CoefficientFunction) -> dict[str, CoefficientFunction]:
     """Fluxes that reference gradients of p and of c drive, by balance."""
-    pull = state.pull
-    return laws.transport(state.material, state.J, state.c, state.cfc, pull * of_p, pull * of_c, 0.0 * of_p)._asdict()
+    return state.driven(state.pull, of_p, of_c, 0.0 * of_p)._asdict()

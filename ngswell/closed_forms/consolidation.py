@@ -25,7 +25,7 @@ EARLIEST = 1e-8
 @refusing
 def consolidation_coefficient(material: Material) -> float:
     """c_v = K (2µ + λ) [mm²/s]."""
-    return material.number("K") * confined_modulus(material)
+    return material.uniform_permeability() * confined_modulus(material)
 
 
 @refusing

@@ -54,7 +54,7 @@ class _Gel(NamedTuple):
 def _gel(material: Material, bath: float) -> _Gel:
     nS0, cfc0 = parameters(material)
     mu, lam = small_strain_moduli(material)
-    D_plus, D_minus, K = (material.number(name) for name in ("D_plus", "D_minus", "K"))
+    D_plus, D_minus, K = material.number("D_plus"), material.number("D_minus"), material.uniform_permeability()
     bath = checked_salt("bath", bath)
     total = sqrt(4 * bath * bath + cfc0 * cfc0)
     plus = (total + cfc0) / 2

@@ -50,8 +50,15 @@ class State(SolidState):
     def transport(self, frame: CoefficientFunction) -> laws.Transport:
         """Fluxes from gradients in the `frame` (a matrix on reference gradients): `pull` or `push`."""
         gradient = self.kinematics.flow_gradient
-        gradients = (frame * g for g in (self.drive(self.p), gradient(self.c), gradient(self.cfc)))
-        return laws.transport(self.material, self.J, self.c, self.cfc, *gradients)
+        return self.driven(frame, self.drive(self.p), gradient(self.c), gradient(self.cfc))
+
+    def driven(self, frame: CoefficientFunction, *gradients: CoefficientFunction) -> laws.Transport:
+        """Fluxes that reference gradients of p, c and cfc drive."""
+
+        def flux(material: Material, frame: CoefficientFunction) -> laws.Transport:
+            return laws.transport(material, self.J, self.c, self.cfc, *(frame * g for g in gradients))
+
+        return laws.Transport(*self.through(frame, flux))
 
     def outputs(self) -> dict[str, CoefficientFunction]:
         """Named fields in the current configuration; `OUTPUT_UNITS` has their units."""

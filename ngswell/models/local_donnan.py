@@ -31,11 +31,16 @@ class State(VirtualBathState):
         Fluid that drags its charge along builds up a streaming potential; zero current (21) with uniform salt makes it
         a smaller permeability. K and D± are those of the material's laws.
         """
-        K, cfc = self.permeability, self.pointwise_charge
+        drive, cfc = self.drive(self.P), self.pointwise_charge
         D_plus, D_minus = laws.diffusivities(self.nF, self.material)
         conductance = D_plus * self.cations + D_minus * self.anions
-        drag = K * self.material.RT * cfc * cfc / (self.nF * conductance)
-        return -K / (1 + drag) * (frame * self.drive(self.P))
+
+        def flux(material: Material, frame: CoefficientFunction) -> tuple[CoefficientFunction]:
+            K = laws.permeability(self.J, material)
+            drag = K * material.RT * cfc * cfc / (self.nF * conductance)
+            return (-K / (1 + drag) * (frame * drive),)
+
+        return self.through(frame, flux)[0]
 
     def outputs(self) -> dict[str, CoefficientFunction]:
         """Named fields in the current configuration; `OUTPUT_UNITS` has their units."""

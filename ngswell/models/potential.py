@@ -25,8 +25,14 @@ class State(VirtualBathState):
 
     def transport(self, frame: CoefficientFunction) -> laws.Transport:
         """Fluxes from gradients in the `frame` (a matrix on reference gradients): `pull` or `push`."""
-        gradients = (frame * self.drive(self.P), frame * self.kinematics.flow_gradient(self.salt))
-        return laws.transport_by_potentials(self.material, self.J, self.salt, self.pointwise_charge, *gradients)
+        drive, gradient = self.drive(self.P), self.kinematics.flow_gradient(self.salt)
+
+        def flux(material: Material, frame: CoefficientFunction) -> laws.Transport:
+            return laws.transport_by_potentials(
+                material, self.J, self.salt, self.pointwise_charge, frame * drive, frame * gradient
+            )
+
+        return laws.Transport(*self.through(frame, flux))
 
     def outputs(self) -> dict[str, CoefficientFunction]:
         """Named fields in the current configuration; `OUTPUT_UNITS` has their units."""

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 
-from ngsolve import BoundaryFromVolumeCF, CoefficientFunction, Cof, Det, Id, InnerProduct, Inv, Mesh, Norm
+from ngsolve import CF, BoundaryFromVolumeCF, CoefficientFunction, Cof, Det, Id, InnerProduct, Inv, Mesh, Norm
 
 from ngswell import checks
 from ngswell.calls import refusing, warn
@@ -15,6 +15,7 @@ from ngswell.errors import ExtrapolationWarning, InputError, place
 from ngswell.models.model import FieldContext
 from ngswell.models.term import Kind, Term
 from ngswell.physics import laws
+from ngswell.physics.anisotropy import Directional
 from ngswell.physics.kinematics import Kinematics
 from ngswell.physics.material import Material
 from ngswell.physics.solid import Deformation, extra_stress
@@ -102,6 +103,22 @@ class SolidState:
         """K(J) [mm⁴/(N s)]."""
         return laws.permeability(self.J, self.material)
 
+    def through(self, frame: CoefficientFunction, flux: Callable[[Material, CoefficientFunction], tuple]) -> list:
+        """The `flux` of a material in a `frame` (`pull` or `push`), where permeability depends on direction too.
+
+        Fluxes are functions of K alone, so that each channel q of the deformed body has those of a body of its permeability:
+        with Fᵀ (q⊗q) F⁻ᵀ after the frame, J F⁻¹ (q⊗q) F⁻ᵀ or (q⊗q) F⁻ᵀ. What is left has K itself.
+        """
+        m, law = self.material, self.material.permeability
+        if not isinstance(law, Directional):
+            return list(flux(m, frame))
+        size, left, fluxes = self.F.dims[0], frame, []
+        for ratio, projection in law.channels(self.whole_F):
+            part = frame * _leading(projection, size)
+            fluxes.append(flux(replace(m, K=ratio * m.K), part))
+            left = left - part
+        return [sum(parts[1:], parts[0]) for parts in zip(flux(m, left), *fluxes, strict=True)]
+
     @cached_property
     def pointwise_charge(self) -> CoefficientFunction:
         """cfc(J) at the point [mol/l]."""
@@ -155,6 +172,11 @@ class SolidState:
             "nS": laws.solidity(self.J, self.material),
             "stress": extra_stress(self.whole_F, self.material) - pore_pressure * Id(3),
         }
+
+
+def _leading(tensor: CoefficientFunction, size: int) -> CoefficientFunction:
+    """The block of a 3 × 3 tensor that a motion has."""
+    return CF(tuple(tensor[i, j] for i in range(size) for j in range(size)), dims=(size, size))
 
 
 def warn_of_extrapolation(what: str, content: float, where: Sequence[float]) -> None:

@@ -12,6 +12,7 @@ from ngswell.errors import InputError
 from ngswell.models.model import BathData, FieldContext
 from ngswell.models.one_pressure import OnePressure
 from ngswell.models.solid_state import SolidState
+from ngswell.physics import laws
 from ngswell.physics.material import Material
 
 
@@ -33,7 +34,8 @@ class State(SolidState):
 
     def seepage(self, frame: CoefficientFunction) -> CoefficientFunction:
         """Darcy's law nF wF = −K grad p in the `frame` (`pull` or `push`) [mm/s]."""
-        return -self.permeability * (frame * self.drive(self.p))
+        drive = self.drive(self.p)
+        return self.through(frame, lambda material, frame: (-laws.permeability(self.J, material) * (frame * drive),))[0]
 
     def outputs(self) -> dict[str, CoefficientFunction]:
         """Named fields in the current configuration; `OUTPUT_UNITS` has their units."""

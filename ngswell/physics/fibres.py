@@ -8,13 +8,14 @@ from math import pi
 from typing import Any, ClassVar
 
 import numpy as np
-from ngsolve import CF, VOL, CoefficientFunction, Id, IfPos, InnerProduct, Mesh, Norm, exp
+from ngsolve import CF, VOL, CoefficientFunction, Id, IfPos, InnerProduct, Mesh, exp
 from numpy.typing import NDArray
 
 from ngswell import checks
 from ngswell.checks import Field
 from ngswell.errors import InputError
 from ngswell.mesh.points import points
+from ngswell.physics.directions import check_length, direction, unit
 from ngswell.physics.solid import Deformation, Located, SolidLaw, SolidParameters
 
 STIFFEST = 1e6
@@ -28,7 +29,8 @@ class Fibres:
     ψ = ξ/(αβ) (exp[α (Iₙ − 1)^β] − 1) where Iₙ > 1, and 0 elsewhere; as α → 0 it is ξ/β (Iₙ − 1)^β.
 
     N has three components in the reference configuration, a vector or a field of position, of any length but zero: x, y, z,
-    also of plane strain and columns, and r, z, hoop when axisymmetric. ξ ≥ 0 [N/mm²] may be a field, β ≥ 2, α ≥ 0 [-].
+    also of plane strain and columns, r, z, hoop when axisymmetric, r, hoop, z when `Cylindrical`, r and two across when
+    `Spherical`. ξ ≥ 0 [N/mm²] may be a field, β ≥ 2, α ≥ 0 [-].
     G. A. Holzapfel, T. C. Gasser and R. W. Ogden, J. Elasticity 61 (2000) 1; "fiber-exp-pow" of FEBio.
     """
 
@@ -40,20 +42,16 @@ class Fibres:
     kinked: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
-        checks.set_fields(self, direction=_direction(self.direction), xi=_stiffness("Fibres: xi", self.xi))
+        checks.set_fields(self, direction=direction("Fibres: direction", self.direction))
+        checks.set_fields(self, xi=_stiffness("Fibres: xi", self.xi))
         _check_exponents(self, "Fibres")
 
     def energy(self, deformation: Deformation, material: SolidParameters) -> CoefficientFunction:
-        direction = CF(self.direction)
-        return self.xi * _tension(deformation, direction / Norm(direction), self.beta, self.alpha)
+        return self.xi * _tension(deformation, unit(self.direction), self.beta, self.alpha)
 
     def check_on(self, mesh: Mesh) -> None:
-        where = points(mesh, VOL, 4)
-        lengths = Norm(CF(self.direction))(where).ravel()
-        if not lengths.min() > 1e-9 * lengths.max():
-            place = "a point of the body" if np.isfinite(lengths).all() else "a point where it is not finite"
-            raise InputError(f"Fibres: direction has the length {lengths.min():g} at {place}; give fibres a direction there")
-        if (least := float(CF(self.xi)(where).min())) < 0:
+        check_length("Fibres: direction", self.direction, mesh)
+        if (least := float(CF(self.xi)(points(mesh, VOL, 4)).min())) < 0:
             raise InputError(f"Fibres: xi = {least:g} N/mm² at a point of the body; it has to be 0 or more")
 
 
@@ -91,8 +89,8 @@ class FibreDistribution:
         directions, weights = hemisphere(*DIRECTIONS)
         weights = weights / np.linalg.norm(directions / np.array(self.xi), axis=1)
         total = CF(0.0)
-        for direction, weight in zip(directions, weights, strict=True):
-            total += float(weight) * _tension(deformation, CF(tuple(map(float, direction))), self.beta, self.alpha)
+        for N, weight in zip(directions, weights, strict=True):
+            total += float(weight) * _tension(deformation, CF(tuple(map(float, N))), self.beta, self.alpha)
         return total
 
 
@@ -123,10 +121,10 @@ class FibreReinforced:
                 law.check_on(mesh)
 
 
-def _tension(deformation: Deformation, direction: CoefficientFunction, beta: float, alpha: float) -> CoefficientFunction:
+def _tension(deformation: Deformation, N: CoefficientFunction, beta: float, alpha: float) -> CoefficientFunction:
     """ψ/ξ of fibres along a unit vector. Iₙ − 1 = N·(C − I)N is exactly zero at F = I, where fibres are slack."""
     C = deformation.F.trans * deformation.F
-    strain = InnerProduct(direction, (C - Id(3)) * direction)
+    strain = InnerProduct(N, (C - Id(3)) * N)
     positive = IfPos(strain, strain, 1.0)  # no powers of what is not positive
     power = strain * strain if beta == 2 else positive**beta
     return IfPos(strain, power / beta if alpha == 0 else (exp(alpha * power) - 1) / (alpha * beta), 0.0)
@@ -144,20 +142,6 @@ def hemisphere(rings: int, around: int) -> tuple[NDArray, NDArray]:
     radii = np.sqrt(1 - heights**2)
     vectors = np.array([(r * np.cos(a), r * np.sin(a), h) for r, h in zip(radii, heights, strict=True) for a in angles])
     return vectors, np.repeat(ring_weights, around) * 4 * pi / around
-
-
-def _direction(direction: Any) -> Any:
-    example = "three components, such as (0, 0, 1), or a field of them"
-    if isinstance(direction, CoefficientFunction):
-        if direction.dim != 3 or direction.is_complex:
-            raise InputError(f"Fibres: direction has to be real with {example}, got {direction.dim}")
-        return direction
-    components = checks.vector("Fibres: direction", direction, 1e6)
-    if len(components) != 3:
-        raise InputError(f"Fibres: direction has to have {example}, got {checks.short(direction)}")
-    if not np.linalg.norm(components) > 1e-6:
-        raise InputError(f"Fibres: direction {components} has no length; give {example}")
-    return components
 
 
 def _stiffness(what: str, value: Field) -> Field:

@@ -6,12 +6,14 @@ gradients they are given, so they come out in the frame the gradients are in.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 from ngsolve import CF, CoefficientFunction, Norm
 
 from ngswell.checks import Field
 from ngswell.physics import donnan
+from ngswell.physics.anisotropy import ratios
 from ngswell.physics.material import Material
 
 
@@ -129,7 +131,10 @@ def own_conductances(
         cations  nF D₊ + |D₋ − D₊| c (nF D₊ + Rθ K cfc)/Θ + 2 |1 − φ| Rθ c L.
 
     The moduli stand for D₋ − D₊ and 1 − φ (times at most c L): the fluxes of unlike signs do not make a penalty negative.
+    Where the permeability depends on direction, K is the largest.
     """
+    if largest := max(ratios(material.permeability), default=0.0):
+        material = replace(material, K=max(largest, 1.0) * material.K)
     nF, K, D_plus, D_minus, D_L, conductance = _mobilities(material, J, c, c - cfc, cfc)
     fluid = K * (1 - D_L * cfc / conductance)
     cations = nF * D_plus + Norm(CF(D_minus - D_plus)) * c * nF * (D_plus + D_L) / conductance

@@ -13,6 +13,7 @@ from ngswell import checks
 from ngswell.checks import Field
 from ngswell.errors import InputError
 from ngswell.mesh.points import points
+from ngswell.physics.anisotropy import ratios
 from ngswell.physics.pores import Constant, Diffusivity, Permeability
 from ngswell.physics.ranges import ONE_NUMBER, within
 from ngswell.physics.solid import Located, NeoHookean, SolidLaw, fields_of, nominal_stress
@@ -120,6 +121,15 @@ class Material:
             raise InputError(f"{name} varies in space: closed forms hold for a homogeneous body, give a number")
         return float(value)
 
+    def uniform_permeability(self) -> float:
+        """K as one number, for closed forms; InputError if it varies in space or with the direction."""
+        if ratios(self.permeability):
+            raise InputError(
+                f"permeability = {checks.short(self.permeability)} depends on direction, while the closed form has one K: "
+                "give a material with the K along the flow and without that law"
+            )
+        return self.number("K")
+
     def laws(self) -> dict[str, object]:
         """The constitutive choices that are not the paper's, by name."""
         names = (*LAWS, "phi", "phi_bath", "Gamma")
@@ -146,10 +156,11 @@ class Material:
                 within(field.name, float(samples.min()))
                 within(field.name, float(samples.max()))
 
-        for name, value in fields_of(self.solid):
-            _check_regions(name, value, mesh)
-        if isinstance(self.solid, Located):
-            self.solid.check_on(mesh)
+        for law in (self.solid, self.permeability):
+            for name, value in fields_of(law, "solid" if law is self.solid else "permeability"):
+                _check_regions(name, value, mesh)
+            if isinstance(law, Located):
+                law.check_on(mesh)
         try:
             stress = float(np.abs(nominal_stress(Id(3), self)(where)).max())
         except Exception as error:  # whatever a user's law raises on fields
