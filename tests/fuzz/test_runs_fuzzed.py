@@ -43,6 +43,7 @@ from ngswell import (
     Nitsche,
     Penalty,
     PlaneStrain,
+    Platen,
     Potential,
     PowerLaw,
     Ramp,
@@ -222,7 +223,14 @@ def trial_of(seed: int) -> Trial:
     scheme = BACKWARD_EULER if isinstance(treatment, Lagged) else dice.one(BACKWARD_EULER, ESDIRK4)
     until = tau * dice.log(1e-6, 1e3)
     steps = dice.one(Fixed(until / dice.one(1, 2, 3, 4, 5, 6), scheme), Adaptive(dice.log(1e-4, 0.1), scheme=scheme))
-    return Trial(scene, steps, until, dice.one(True, False))
+    exact = dice.one(True, False)
+    moved = dice.one(None, None, None, None, "displacement", "force")  # drawn last: the other trials stay what they were
+    if moved:
+        way = size_of(0.01, 0.3, 1e-6, 30.0) * size if moved == "displacement" else min(1e3, abs(load) or hydraulic) * size
+        amount = dice.one(-1, -1, 1) * way
+        push = Ramp((0.0, 0.0), (tau * dice.log(1e-9, 1.0), amount), (2 * tau, dice.one(amount, amount, 0.0)))
+        scene |= {"loads": [], "supports": [*scene["supports"], Platen("top", **{moved: push}, glued=dice.one(True, False))]}
+    return Trial(scene, steps, until, exact)
 
 
 FIRST = secrets.randbelow(10**9) if FRESH else 0
