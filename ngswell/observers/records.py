@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from array import array
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from math import prod
 from pathlib import Path
 from typing import Any
@@ -25,7 +25,8 @@ from ngswell.streams import CSV, Stream
 class Table:
     """Rows of a time and of numbers, vectors and tensors by name; all rows are alike."""
 
-    def __init__(self, what: str, to: CSV | None) -> None:
+    def __init__(self, what: str, to: CSV | None, unit: Callable[[str], str]) -> None:
+        self._unit = unit  # of a quantity, for the header of a file
         self._stream = None if to is None else Stream(to, what)
         self._numbers = array("d")  # of all rows, one after another; none of those in a file
         self._shapes: dict[str, tuple[int, ...]] = {}
@@ -40,18 +41,20 @@ class Table:
         if not self._shapes:
             self._shapes = {name: value.shape for name, value in values.items()}
             if self._stream is not None:
-                self._stream.write(["time", *self._header()])
+                self._stream.write(["time [s]", *self._header()])
         if self._stream is not None:
             self._stream.write(list(map(repr, numbers)))
         else:
             self._numbers.extend(numbers)
 
     def _header(self) -> list[str]:
-        """Names of the columns beside the time: "p", "displacement 1"."""
-        header = []
+        """Names of the columns beside the time, with their units as in `to_csv`: "p [N/mm²]", "displacement 1 [mm]"."""
+        header: list[str] = []
+        units: list[str] = []
         for name, shape in self._shapes.items():
             header += [name] if shape == () else [f"{name} {number}" for number in range(1, prod(shape) + 1)]
-        return header
+            units += [self._unit(name)] * prod(shape)
+        return [f"{name} [{unit}]" for name, unit in zip(header, units, strict=True)]
 
     def _rows(self) -> NDArray:
         width = 1 + sum(map(prod, self._shapes.values()))
@@ -122,7 +125,7 @@ class Recorder(Observer):
             raise InputError(f"{what}: dense records lie between steps, at times `when`: give an interval or a list [s]")
         self._dense = bool(dense)
         super().__init__(when, *settings, *(("dense",) if dense else ()), *(() if file is None else (file,)))
-        self._table = Table(what, file)
+        self._table = Table(what, file, self.unit)
 
     @abstractmethod
     def row(self, problem: Problem) -> Mapping[str, Any]:

@@ -12,7 +12,7 @@ from ngswell.stepping.steps import StepReport
 from ngswell.stepping.tally import Tally
 from ngswell.streams import CSV, Stream
 
-HEADER = ("time", "dt", "iterations", "error", "rejected")
+HEADER = ("time [s]", "dt [s]", "iterations [-]", "error [-]", "rejected")
 
 
 class StepLog:

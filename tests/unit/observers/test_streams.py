@@ -79,8 +79,8 @@ def test_files_hold_the_same_numbers_to_the_bit(make, tmp_path):
     assert other.summary().startswith(one.summary().partition(" Newton")[0])
     assert pickle.loads(pickle.dumps(other.steps)) == one.steps
     columns = CSV(tmp_path / "probe.csv").read()
-    assert list(columns)[:3] == ["time", "J", "displacement" if where == (0.5,) else "displacement 1"]
-    np.testing.assert_array_equal(columns["J"], here[0].values["J"])
+    assert list(columns)[:3] == ["time [s]", "J [-]", "displacement [mm]" if where == (0.5,) else "displacement 1 [mm]"]
+    np.testing.assert_array_equal(columns["J [-]"], here[0].values["J"])
     assert not [file for file in tmp_path.iterdir() if file.suffix != ".csv"]  # locks are gone
 
 
@@ -155,7 +155,7 @@ def test_a_run_goes_on_with_its_files_and_drops_what_lies_beyond_its_checkpoint(
     for file in folder.glob("*.csv"):
         with open(file, "a") as more:
             more.write("12.0,999.0,99")  # of a step whose checkpoint was not reached, cut short
-    assert CSV(folder / "whole.csv").read()["time"][-1] == 10.0
+    assert CSV(folder / "whole.csv").read()["time [s]"][-1] == 10.0
     observers, result = run(folder, 20.0)
     check_equal(numbers(observers, result), whole)
     for file in folder.glob("*.csv"):
@@ -237,7 +237,7 @@ def test_overwriting_starts_anew_and_links_stay(tmp_path):
     for _ in range(2):
         gel().run(4.0, Fixed(2.0), [Probe((0.5,), "J", to=CSV(tmp_path / "J.csv", overwrite=True))])
     assert (tmp_path / "J.csv").is_symlink()
-    assert CSV(tmp_path / "disk" / "J.csv").read()["time"].tolist() == [0.0, 2.0, 4.0]
+    assert CSV(tmp_path / "disk" / "J.csv").read()["time [s]"].tolist() == [0.0, 2.0, 4.0]
 
 
 def test_records_stay_when_a_run_stops(tmp_path):
