@@ -84,7 +84,7 @@ def check_displacements(supports: Sequence[Support], surroundings: Surroundings,
             raise InputError(
                 f"{one}: its displacement is {first:g} mm at the start ({undeformed_at:g} s), where the body is undeformed: "
                 f"give a ramp, Ramp(({undeformed_at:g}, 0.0), ({undeformed_at + 1:g}, {first:g})); `equilibrate(time=...)` "
-                "gives the state of rest at its end"
+                "gives the state of rest at its end; a body that is there already goes on with `scene.after`"
             )
     _check_agreement(everything, [pin for support in supports for pin in support.pins(surroundings)], surroundings)
 

@@ -79,7 +79,7 @@ def hold(*moving):
         (lambda: Roller("top", "y", Blend(Ramp((0, 0.0)), DOWN, x)), "varies in space"),
         (lambda: hold(Roller("top", "yy", (DOWN, DOWN))), "names one twice"),
         (lambda: hold(Roller("top", "y", Ramp((0, 0.0), (1, -100.0)))), "goes to -100 mm, more than 10 lengths.*in mm"),
-        (lambda: hold(Roller("top", "y", -0.1)), r"-0.1 mm at the start \(0 s\).*Ramp\(\(0, 0.0\), \(1, -0.1\)\)"),
+        (lambda: hold(Roller("top", "y", -0.1)), r"-0.1 mm at the start \(0 s\).*Ramp\(\(0, 0.0\), \(1, -0.1\)\).*after"),
         (lambda: hold(Roller("left", "x", DOWN)), "Symmetry on 'left' and Roller on 'left' hold .* in x .* differently"),
         (lambda: hold(Roller("top", "x", DOWN)), r"hold the displacement in x at the vertex \(0, 1\) mm differently"),
         (lambda: block(Roller("bottom", "xy"), Roller("right", "y", DOWN)), r"vertex \(1, 0\) mm differently"),
