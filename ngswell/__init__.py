@@ -67,7 +67,9 @@ from ngswell.scene import Scene
 from ngswell.schedules import Blend, Ramp
 from ngswell.setup.efflux import Efflux
 from ngswell.setup.loads import Load, Pressure, Traction, Weight
+from ngswell.setup.obstacles import Obstacle
 from ngswell.setup.platen import Platen
+from ngswell.setup.rigid import RigidCylinder, RigidPlane, RigidSphere
 from ngswell.setup.setup import Setup
 from ngswell.setup.snapshot import Snapshot
 from ngswell.setup.supports import Pin, Roller, Support, Symmetry
@@ -85,13 +87,13 @@ __all__ = [
     "Essential", "ExtrapolationWarning", "FibreDistribution", "FibreReinforced", "Fibres", "Fixed", "Frozen", "HolmesMow",
     "HolmesMowSolid", "InnerLayer", "InputError", "InstabilityError", "InstabilityWarning", "Integral", "Lagged",
     "LeastSquares", "Ledger", "Load", "LocalDonnan", "LogNeoHookean", "MPa", "MackieMeares", "Material", "MooneyRivlin",
-    "Multiplier", "NeoHookean", "NgswellError", "Nitsche", "Observer", "Orthotropic", "Outflow", "OutputError",
+    "Multiplier", "NeoHookean", "NgswellError", "Nitsche", "Observer", "Obstacle", "Orthotropic", "Outflow", "OutputError",
     "OverlapWarning", "Penalty", "Pin", "PlaneStrain", "Platen", "Potential", "PowerLaw", "Prescribed", "Pressure", "Probe",
-    "Problem", "Progress", "Ramp", "Reaction", "Reason", "Restart", "Result", "Role", "Roller", "Scene", "Setup", "Sine",
-    "Snapshot", "Snapshots", "Spatial", "Spherical", "Spline", "Stability", "StepError", "Support", "Symmetry", "Term",
-    "Traction", "TransverselyIsotropic", "TwoLevelSolver", "Uncharged", "UnitsWarning", "Vessel", "Weak", "Weight", "box",
-    "by_region", "check_mesh", "column", "day", "from_occ", "hour", "kPa", "metre", "micrometre", "ray", "read_checkpoint",
-    "read_mesh", "rectangle", "year",
+    "Problem", "Progress", "Ramp", "Reaction", "Reason", "Restart", "Result", "RigidCylinder", "RigidPlane", "RigidSphere",
+    "Role", "Roller", "Scene", "Setup", "Sine", "Snapshot", "Snapshots", "Spatial", "Spherical", "Spline", "Stability",
+    "StepError", "Support", "Symmetry", "Term", "Traction", "TransverselyIsotropic", "TwoLevelSolver", "Uncharged",
+    "UnitsWarning", "Vessel", "Weak", "Weight", "box", "by_region", "check_mesh", "column", "day", "from_occ", "hour",
+    "kPa", "metre", "micrometre", "ray", "read_checkpoint", "read_mesh", "rectangle", "year",
 ]  # fmt: skip
 
 for _name in __all__:

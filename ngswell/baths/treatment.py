@@ -50,6 +50,16 @@ class Surroundings(Protocol):
     @property
     def loads(self) -> Sequence[Any]: ...
 
+    @property
+    def start(self) -> float:
+        """When it starts [s]."""
+        ...
+
+    @property
+    def origin(self) -> Any:
+        """The snapshot that it starts from; None: the undeformed body."""
+        ...
+
     def treatment(self, bath: Any) -> Treatment:
         """How equilibrium with a bath of the setup is imposed."""
         ...

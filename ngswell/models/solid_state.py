@@ -40,7 +40,7 @@ class SolidState:
 
     @property
     def mesh(self) -> Mesh:
-        """The mesh of the fields of a result (trial functions have none)."""
+        """The mesh of the fields."""
         return self.u.space.mesh
 
     @cached_property

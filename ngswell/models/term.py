@@ -24,6 +24,7 @@ class Role(Enum):
     ADJOINT = "keeps the form consistent or symmetric; it takes nothing out"
     CONDITION = "a condition of its own, tested beside the balances"
     LOAD = "a force from outside"
+    CONTACT = "the force of what the body only touches"
 
 
 @dataclass(frozen=True)
@@ -32,7 +33,7 @@ class Term:
 
     Integrated over `boundary` if that is named, else over the body. On a boundary, fields have tangential derivatives only,
     unless the term asks for `normal_derivatives`. A content that `lumps` is taken at vertices where its
-    integrals fail.
+    integrals fail. Derivatives of a `kinked` term jump with the unknowns.
     """
 
     balance: str
@@ -43,6 +44,7 @@ class Term:
     boundary: str | None = None
     normal_derivatives: bool = False
     lumps: bool = False
+    kinked: bool = False
 
     def __str__(self) -> str:
         return f"{self.balance}: {self.name}" + (f" [{self.boundary}]" if self.boundary else "")

@@ -1,8 +1,9 @@
-"""The force on a held boundary, from the balance of momentum."""
+"""The force on a boundary that is held or touches an obstacle, from the balance of momentum."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,9 @@ from numpy.typing import NDArray
 from ngswell import checks
 from ngswell.errors import InputError
 from ngswell.mesh.points import vertices_of
+from ngswell.models.term import Role
 from ngswell.observers.records import Recorder, power_of_mm
+from ngswell.problem.forms import form
 from ngswell.problem.problem import Problem
 from ngswell.setup.setup import Setup
 from ngswell.streams import CSV
@@ -22,7 +25,7 @@ UNITS = ("N/mm²", "N/mm", "N")
 
 
 class Reaction(Recorder):
-    """Force with which the body pushes on what holds a boundary: a vector along the directions of the motion.
+    """Force with which the body pushes on what holds a boundary or is touched by it: a vector along the motion's directions.
 
         base = Reaction("bottom")  # or "bottom|left", their sum
 
@@ -30,12 +33,13 @@ class Reaction(Recorder):
     All held boundaries together bear the sum of the loads, a bath's pressure among them, to what the solves leave (along r
     the hoop stress bears a share). Directions that are not held have 0. A vertex that several held boundaries share counts,
     in each direction, with the one whose support stands first in the scene; a pinned vertex counts with the first held
-    boundary that it is on, and with none if it is on none.
+    boundary that it is on, and with none if it is on none. What obstacles bear on the boundary is added.
 
     `values` has one row a time: N/mm² in a column, N per mm of thickness in plane strain or length of a cylinder, N in
     space, and N on the whole circumference, 2π, when axisymmetric; along r that is the sum of the radial forces. At a
     start out of balance it is that of the fields as they are. With `to`, a path or a `CSV`, records go to that file;
-    `dense` as in `Probe`. Raises InputError for a boundary on which nothing is held.
+    `dense` as in `Probe`. Raises InputError for a boundary on which nothing is held and that no
+    obstacle may touch.
     """
 
     def __init__(
@@ -51,10 +55,20 @@ class Reaction(Recorder):
 
     def prepare(self, problem: Problem, begin: float, until: float) -> None:
         names, owners = problem.setup.check_boundary("Reaction", self.boundary), _owners(problem.setup)
+        pushed = [
+            replace(term, boundary=name)
+            for term in problem.terms
+            if term.role is Role.CONTACT and term.boundary is not None
+            for name in term.boundary.split("|")
+        ]
+        touching = {term.boundary for term in pushed}
         for name in names:
-            if name not in owners.values():
+            if name not in owners.values() and name not in touching:
                 held = ", ".join(sorted(map(repr, set(owners.values())))) or "none"
-                raise InputError(f"Reaction: nothing is held on {name!r}; held boundaries are {held}")
+                met = ", ".join(sorted(map(repr, touching))) or "none"
+                raise InputError(
+                    f"Reaction: nothing is held on {name!r}; held boundaries are {held}, those with an obstacle {met}"
+                )
         directions = problem.kinematics.directions
         displacement = problem.ranges[problem.names[0]]
         per_component = (displacement.stop - displacement.start) // len(directions)
@@ -66,6 +80,10 @@ class Reaction(Recorder):
             ]
             for axis, direction in enumerate(directions)
         ]
+        firsts = [displacement.start + axis * per_component for axis in range(len(directions))]
+        self._vertices = [slice(first, first + problem.mesh.nv) for first in firsts]
+        mine = [term for term in pushed if term.boundary in names]
+        self._pushes = form(problem, mine) if mine else None
         self._lacks, self._unit = problem.fields.vec.CreateVector(), UNITS[power_of_mm(problem) - 1]
 
     def unit(self, name: str) -> str:
@@ -74,7 +92,11 @@ class Reaction(Recorder):
     def row(self, problem: Problem) -> Mapping[str, Any]:
         problem.outflow(self._lacks)
         lacks = self._lacks.FV().NumPy()
-        return {"force": [-lacks[dofs].sum() for dofs in self._dofs]}
+        force = np.array([-lacks[dofs].sum() for dofs in self._dofs])
+        if self._pushes is not None:
+            self._pushes.Apply(problem.fields.vec, self._lacks)
+            force += [lacks[part].sum() for part in self._vertices]
+        return {"force": force}
 
     @property
     def values(self) -> NDArray:

@@ -9,11 +9,11 @@ from ngsolve import CoefficientFunction
 
 from ngswell.baths.bath import Bath, area
 from ngswell.baths.treatment import Contact, Weak
+from ngswell.mesh.sizes import cell_size
 from ngswell.models.model import BathFields
 from ngswell.models.one_number import Functions
 from ngswell.models.term import Term
 from ngswell.problem.discretisation import Discretisation
-from ngswell.problem.forms import cell_size
 from ngswell.schedules import Clock
 
 CONDUCTANCES = {"fluid": "K", "cations": "D_plus"}

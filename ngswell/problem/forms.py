@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from ngsolve import CF, VOL, BilinearForm, Integrate, Mesh, Variation, ds, dx
+from ngsolve import BilinearForm, Variation, ds, dx
 
 from ngswell.models.term import Kind, Role, Term
 from ngswell.problem.discretisation import BONUS_ORDER, Discretisation
@@ -50,13 +50,3 @@ def form(discretisation: Discretisation, terms: list[Term], rates: Any = None, c
         else:
             result += integral(discretisation, term, rates if term.kind is Kind.RATE else None)
     return result
-
-
-def cell_size(mesh: Mesh, boundary: str) -> float:
-    """Volume of the cells at a boundary over its area: their size normal to it [mm]."""
-    region = mesh.Boundaries(boundary)
-    nodes = {1: "vertices", 2: "edges", 3: "faces"}[mesh.dim]
-    faces = {getattr(element, nodes)[0].nr for element in region.Elements()}
-    cells = {cell.nr for cell in mesh.Elements(VOL) if any(face.nr in faces for face in cell.facets)}
-    volumes = Integrate(CF(1.0), mesh, VOL, element_wise=True).NumPy()
-    return float(volumes[sorted(cells)].sum() / Integrate(CF(1.0), mesh, definedon=region))

@@ -222,6 +222,11 @@ class Problem(Discretisation):
         return any(term.normal_derivatives for term in self.terms)
 
     @cached_property
+    def kinked(self) -> bool:
+        """Whether dr/dx jumps somewhere."""
+        return any(term.kinked for term in self.terms)
+
+    @cached_property
     def condensed(self) -> BilinearForm | None:
         """The system without the unknowns inside cells, to be assembled like `linearise`; None where it gains nothing."""
         inside = sum(self.space.FreeDofs()) - sum(self.space.FreeDofs(True))

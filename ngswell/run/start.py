@@ -82,6 +82,8 @@ class Start:
         problem.initialise()
         if self.snapshot is not None:
             problem.restore(self.snapshot)
+            for load in problem.setup.loads:
+                load.check_start(problem.state, problem.time)
         self._check_vessels(problem)
 
     def _check_vessels(self, problem: Problem) -> None:

@@ -28,13 +28,18 @@ class Load(Protocol):
     2. `terms`: its terms of the momentum balance, with `Role.LOAD`;
     3. `schedules`: the histories that it follows, if any; `clock.follow(history)` makes the field that a term takes;
     4. `fluid_weight`: a body force on the fluid [N/mm³], which also drives seepage, if it has one: numbers or histories;
-    5. `flows`: its terms of the other balances, if it has any, with `Role.EFFLUX` what leaves through a boundary.
+    5. `flows`: its terms of the other balances, if it has any, with `Role.EFFLUX` what leaves through a boundary;
+    6. `check_start`: its refusals of the fields that a run goes on from, if any.
     """
 
     schedules: tuple[Schedule, ...] = ()
     fluid_weight: tuple[float | Schedule, ...] | None = None
 
     def check_in(self, surroundings: Surroundings) -> None: ...
+
+    def check_start(self, state: Any, time: float) -> None:
+        """Refuse fields, the model's `state` at `time` [s]."""
+        return
 
     def terms(self, state: Any, v: CoefficientFunction, clock: Clock) -> list[Term]:
         """Less the power of the load over the test displacement `v`; `state` holds the trial functions.

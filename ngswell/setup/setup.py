@@ -106,7 +106,7 @@ class Setup:
             self,
             supports=checks.several("supports", self.supports, Support, "Roller, Symmetry, Platen or Pin"),
             baths=checks.several("baths", self.baths, Bath, "Bath(...)"),
-            loads=checks.several("loads", self.loads, Load, "Traction, Pressure, Weight or Efflux"),
+            loads=checks.several("loads", self.loads, Load, "Traction, Pressure, Obstacle, Weight or Efflux"),
             start=checks.number("start", self.start, "s", -LARGEST, LARGEST),
         )
         if self.origin is not None:

@@ -48,7 +48,8 @@ class DampedNewton:
     the test of convergence is applied as well, so accepted states are about a factor `tolerance` better than tested.
 
     At kinks of a solid, where fibres go taut, the old matrix knows one side only: where the test passes no step, the part of
-    the correction that does work is taken (`search`).
+    the correction that does work is taken (`search`). At those of terms, where a body begins to touch, a simplified
+    correction that fails the test is taken again with the matrix of the new fields.
 
     A factorisation is kept, over iterations, stages and steps, as long as each correction is at most `slowest` times the one
     before; the error that is left is then estimated as that of a geometric series. With 0, each iteration has its own.
@@ -163,6 +164,8 @@ class _Iteration:
                         break
                     if self.small and rate * before <= STAGNANT:
                         return self._success(), True, damping
+                if fresh and problem.kinked and self._renewed_rate(before) <= 1 - damping / 4:
+                    return None, True, damping
             if not fresh:
                 break
             damping /= 2
@@ -187,6 +190,15 @@ class _Iteration:
         if not self.problem.setup.material.kinked or not search(self.problem, self.correction, self.residual):
             return False
         return self.factorisation.renew(self.problem) and self._solve(self.simplified)
+
+    def _renewed_rate(self, before: float) -> float:
+        """The size of the correction with a matrix of the present fields, over that `before`; infinite where there is none.
+
+        Across a kink the old matrix says nothing of the new fields: a body that begins to touch meets a stiffness that it
+        does not have.
+        """
+        renewed = self.factorisation.renew(self.problem) and self._solve(self.simplified)
+        return self._size(self.simplified) / before if renewed else inf
 
     def _finish(self) -> Outcome:
         """Apply the simplified correction that passed the test as well."""

@@ -73,9 +73,9 @@ from ngswell import (
 )
 from ngswell.baths.treatment import Treatment
 from ngswell.errors import InputError, NgswellError
+from ngswell.mesh.sizes import cell_size
 from ngswell.models.term import Term
 from ngswell.observers.base import Observer
-from ngswell.problem.forms import cell_size
 from ngswell.problem.problem import Problem
 from ngswell.setup.supports import Support
 from ngswell.stepping.steps import Step

@@ -57,10 +57,10 @@ from ngswell import (
     rectangle,
 )
 from ngswell.errors import Reason
+from ngswell.mesh.sizes import cell_size
 from ngswell.observers.base import Observer
 from ngswell.physics.pores import Constant
 from ngswell.problem.admissible import TURNED
-from ngswell.problem.forms import cell_size
 from ngswell.problem.problem import Problem
 from ngswell.stepping.schemes import Scheme
 from tests.fuzz.fuzzing import FRESH, SCALE

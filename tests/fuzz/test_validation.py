@@ -46,6 +46,7 @@ from ngswell import (
     Multiplier,
     NeoHookean,
     Nitsche,
+    Obstacle,
     Orthotropic,
     Penalty,
     Pin,
@@ -58,6 +59,9 @@ from ngswell import (
     Progress,
     Ramp,
     Reaction,
+    RigidCylinder,
+    RigidPlane,
+    RigidSphere,
     Roller,
     Scene,
     Snapshots,
@@ -167,6 +171,7 @@ SIZES = log_uniform(1e-6, 1e6)
 CELLS = st.integers(1, 3)
 NO_CELLS = st.one_of(JUNK.filter(lambda value: not isinstance(value, int) or not 3 < value <= 10**7), st.just(10**9))
 SCHEMES = st.sampled_from([BACKWARD_EULER, ESDIRK4])
+SHAPES = st.sampled_from([RigidPlane((0.0, 2.0), (0.0, -1.0)), RigidSphere((0.0, 3.0), 1.0), RigidCylinder((0.0, 3.0), 1.0)])
 WHEN = st.one_of(st.none(), log_uniform(1e-4, 100.0), st.lists(st.floats(0.0, 10.0), min_size=1, max_size=5))
 
 PIECES = {
@@ -194,6 +199,10 @@ PIECES = {
     Traction: [NAMES, st.tuples(PLACES, st.one_of(PLACES, RAMPS))],
     Pressure: [NAMES, st.one_of(st.floats(-1e3, 1e3), HISTORIES)],
     Efflux: [NAMES, st.one_of(st.floats(1e-3, 1e3), RAMPS), st.one_of(st.floats(-1e3, 1e3), RAMPS)],
+    RigidPlane: [st.tuples(PLACES, PLACES), st.sampled_from([(0.0, 1.0), (3.0, -4.0)])],
+    RigidSphere: [st.tuples(PLACES, PLACES), log_uniform(1e-6, 1e6)],
+    RigidCylinder: [st.tuples(PLACES, PLACES), log_uniform(1e-6, 1e6), st.sampled_from([None, (0.0, 1.0)])],
+    Obstacle: [NAMES, SHAPES, st.tuples(st.one_of(PLACES, RAMPS), PLACES), log_uniform(1.0, 1e6)],
     Weight: [st.tuples(st.floats(-1, 1), st.floats(-1, 1)), st.tuples(st.floats(-1, 1), st.floats(-1, 1))],
     Potential: [st.integers(2, 6)],
     Concentration: [st.integers(2, 6)],
