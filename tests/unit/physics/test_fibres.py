@@ -38,6 +38,7 @@ from ngswell.closed_forms.consolidation import consolidation_coefficient
 from ngswell.closed_forms.homogeneous import homogeneous_equilibrium
 from ngswell.physics.fibres import hemisphere
 from ngswell.physics.solid import small_strain_moduli
+from ngswell.run.digest import setup_digest
 from tests.unit.physics.test_elastic import F, energy, nominal
 
 OBLIQUE = (1.0, 2.0, -0.5)
@@ -265,18 +266,25 @@ def test_swollen_bodies_come_to_the_balance_with_their_fibres(motion):
         assert scene.state(idle.equilibrate()).at(point, "J") == pytest.approx(without.at(point, "J"), rel=1e-9)
 
 
-def test_a_checkpoint_and_a_description_tell_fibres():
-    scene = body("plane strain", Fibres(CF((x, 1, 0)), 0.2))
-    assert "solid: FibreReinforced(" in scene.describe()
-
-
-class Unsaid(Fibres):
-    """The same fibres, which do not say that they have a kink."""
-
-    kinked = False
+def test_checkpoints_and_descriptions_tell_fibres():
+    scenes = [
+        body("plane strain", Fibres(*settings))
+        for settings in [
+            ((1, 1, 0), 0.2),
+            ((1, 2, 0), 0.2),
+            (CF((x, 1, 0)), 0.2),
+            (CF((y, 1, 0)), 0.2),
+            ((1, 1, 0), 0.2 * x),
+        ]
+    ]
+    assert len({setup_digest(scene)["material"] for scene in scenes}) == len(scenes)
+    assert setup_digest(scenes[0]) == setup_digest(body("plane strain", Fibres((1, 1, 0), 0.2)))
+    assert "solid: FibreReinforced(" in scenes[0].describe()
 
 
 class UnsaidSolid(FibreReinforced):
+    """The same solid, which does not say that it has a kink."""
+
     kinked = False
 
 
