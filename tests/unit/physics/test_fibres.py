@@ -13,6 +13,7 @@ from ngswell import (
     Axisymmetric,
     Bath,
     Confined,
+    Cylindrical,
     FibreDistribution,
     FibreReinforced,
     Fibres,
@@ -32,6 +33,7 @@ from ngswell import (
     box,
     by_region,
     column,
+    ray,
     rectangle,
 )
 from ngswell.closed_forms.consolidation import consolidation_coefficient
@@ -199,6 +201,7 @@ MOTIONS = {
         [Roller("left", "r"), Roller("bottom", "z")],
         "top|right",
     ),
+    "cylindrical": (Cylindrical(), lambda: ray(0.0, 1.0, 2), [Roller("inner", "r")], "outer"),
     "3-d": (
         Spatial(),
         lambda: box(1, 1, 1, 1, 1, 1),
@@ -235,6 +238,7 @@ def rest(motion, xi, m=TABLE_2, salt=0.3):
         return {
             "confined": (taut, 1.0, 1.0),
             "plane strain": (taut, taut, 1.0),
+            "cylindrical": (taut, taut, 1.0),
             "axisymmetric": (taut, taut, free),
             "3-d": (taut, taut, free),
         }[motion]
@@ -246,10 +250,15 @@ def rest(motion, xi, m=TABLE_2, salt=0.3):
     return low
 
 
-BOTH = {"confined": [(1, 0, 0)], "plane strain": [(1, 0, 0), (0, 1, 0)], "3-d": [(1, 0, 0), (0, 1, 0)],
-        "axisymmetric": [(1, 0, 0), (0, 0, 1)]}  # fmt: skip
+BOTH = {
+    "confined": [(1, 0, 0)],
+    "plane strain": [(1, 0, 0), (0, 1, 0)],
+    "cylindrical": [(1, 0, 0), (0, 1, 0)],
+    "axisymmetric": [(1, 0, 0), (0, 0, 1)],
+    "3-d": [(1, 0, 0), (0, 1, 0)],
+}
 """Fibres along the directions that stretch alike; radial and hoop when axisymmetric."""
-IDLE = {"confined": (0, 1, 0), "plane strain": (0, 0, 1)}
+IDLE = {"confined": (0, 1, 0), "plane strain": (0, 0, 1), "cylindrical": (0, 0, 1)}
 """Fibres across the column and the plane: they do not stretch."""
 
 
@@ -264,6 +273,19 @@ def test_swollen_bodies_come_to_the_balance_with_their_fibres(motion):
         idle = body(motion, Fibres(IDLE[motion], 1e3))
         point = (0.4,) * scene.mesh.dim
         assert scene.state(idle.equilibrate()).at(point, "J") == pytest.approx(without.at(point, "J"), rel=1e-9)
+
+
+@pytest.mark.parametrize("motion", ["axisymmetric", "3-d"])
+def test_fibres_in_all_directions_in_a_swollen_body(motion):
+    """Swollen alike in all directions by J = λ³: µ (λ² − 1) + λ ln J + 8π/3 ξ λ² (λ² − 1) = J (p_D), β = 2."""
+    material, xi = reinforced(FibreDistribution(0.05)), 0.05
+    scene = body(motion, material=material)
+    found = scene.state(scene.equilibrate()).at((0.4,) * scene.mesh.dim, "J")
+    assert found == pytest.approx(homogeneous_equilibrium(material, 0.3, "3-d").J, rel=1e-8)  # Newton's tolerance
+    m, square = material, found ** (2 / 3)
+    cfc = (1 - m.nS0) * m.cfc0 / (found - m.nS0)
+    solid = m.mu * (square - 1) + m.lam * log(found) + 8 * pi / 3 * xi * square * (square - 1)
+    assert solid == pytest.approx(found * 2 * m.RT * (sqrt(0.3**2 + cfc**2 / 4) - 0.3), rel=1e-7)
 
 
 def test_checkpoints_and_descriptions_tell_fibres():
