@@ -1,11 +1,12 @@
-"""A microgel bead and clay between aquifers, each a file of at most 40 lines, against closed forms and finer runs."""
+"""A microgel bead, clay between aquifers and a borehole, in at most 40 lines each, against closed forms and finer runs."""
 
 from dataclasses import replace
-from math import exp, pi, sin
+from math import exp, pi, sin, sqrt
 from pathlib import Path
 
 import pytest
 
+from examples import borehole
 from examples import clay_between_aquifers as clay
 from examples import microgel_bead as bead
 from ngswell import Adaptive, micrometre, year
@@ -14,7 +15,7 @@ from ngswell.closed_forms.homogeneous import homogeneous_equilibrium
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
 
-@pytest.mark.parametrize("name", ["microgel_bead", "clay_between_aquifers"])
+@pytest.mark.parametrize("name", ["microgel_bead", "clay_between_aquifers", "borehole"])
 def test_they_fit_a_screen(name):
     assert len((EXAMPLES / f"{name}.py").read_text(encoding="utf-8").splitlines()) <= 40
 
@@ -60,3 +61,21 @@ def test_salt_alone_diffuses_by_its_series():
         series = sum(2 * (-1) ** n / (n * pi) * sin(n * pi * place) * exp(-((n * pi) ** 2) * T) for n in range(1, 40))
         fallen.append((clay.SEA - anions[number]) / (clay.SEA - clay.FRESH) - (place + series))
     assert fallen == pytest.approx([0.0] * 3, abs=1e-3)  # the ramp's second moment (1e-4) and the mesh
+
+
+def test_a_borehole_by_the_closed_forms_of_small_strain():
+    m, drop, a, b = borehole.CLAY, 0.01 * borehole.ROCK, borehole.WALL, borehole.FAR
+    mu, charge, salt = m.number("mu"), m.number("cfc0"), borehole.SALT
+    inwards, hoop = borehole.wall(borehole.borehole(drop=drop))
+    # Lamé's tube: sheared around the hole, drained and undrained alike but for a²/b² = 4e-4; strains of 1e-4 are left.
+    lame = drop * a / (2 * mu) / (1 - (a / b) ** 2)
+    assert [inwards[1], inwards[-1]] == pytest.approx([lame, lame], rel=2e-4)
+    assert hoop[[0, -1]] == pytest.approx([-borehole.ROCK, -borehole.ROCK - drop], rel=1e-4)
+    # Mud of 2 % less salt: the swollen wall is held around by the rest. −2µ/(2µ + λ′) of what the osmotic pressure rises by,
+    # λ′ = λ + Rθ cfc²/(nF sqrt(cfc² + 4c̄²)) with the stiffness that the charge brings; second order in the change is left.
+    mud = 0.98 * salt
+    moved, loaded = borehole.wall(borehole.borehole(mud, drop))
+    osmotic = 2 * m.RT * ((sqrt(mud**2 + charge**2 / 4) - mud) - (sqrt(salt**2 + charge**2 / 4) - salt))
+    stiff = m.number("lam") + m.RT * charge**2 / ((1 - m.number("nS0")) * sqrt(charge**2 + 4 * salt**2))
+    assert loaded[-1] - hoop[-1] == pytest.approx(-2 * mu / (2 * mu + stiff) * osmotic, rel=2e-3)
+    assert abs(moved[-1] / inwards[-1] - 1) < 1e-4
