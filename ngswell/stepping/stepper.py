@@ -149,9 +149,10 @@ class Stepper:
             if same_time(time + dt, stop):  # what would be left is round-off
                 dt = stop - time
             end = stop if dt == stop - time else time + dt
-            attempt = self._attempts.take(scheme, self.accepted, self._points, self._slope, end, lumped)
+            points = self._points if lumped == self._lumped else []  # salt that is stored otherwise moves at once
+            attempt = self._attempts.take(scheme, self.accepted, points, self._slope, end, lumped)
             error = safety * self._error(attempt)
-            if attempt.failure is None and self._accepts(error, scheme, last):
+            if attempt.failure is None and self._accepts(error, scheme, last, bool(points)):
                 return self._accept(attempt, error, scheme, dt, tuple(rejected))
             rejection, failure = self._reject(attempt, error, dt)
             rejected.append(rejection)
@@ -200,8 +201,8 @@ class Stepper:
     def _error(self, attempt: Attempt) -> float:
         return inf if attempt.difference is None else attempt.factor * self._sizes.relative(attempt.difference)
 
-    def _accepts(self, error: float, scheme: Scheme, last: Rejection | None) -> bool:
-        jumps = not scheme.embedded and not self._points and last is not None and error > JUMP * last.error
+    def _accepts(self, error: float, scheme: Scheme, last: Rejection | None, smooth: bool) -> bool:
+        jumps = not scheme.embedded and not smooth and last is not None and error > JUMP * last.error
         return self.control.accepts(error) or jumps
 
     def _reject(self, attempt: Attempt, error: float, dt: float) -> tuple[Rejection, Failure]:
