@@ -18,6 +18,9 @@ from ngswell.setup.snapshot import Snapshot
 MOST_PAIRS = 4_000_000
 """Pairs of a cell and a side that are looked at; of larger bodies only some cells are, evenly spread."""
 
+SOLVES = 100
+"""Solves of a run between two looks: one costs less than a hundredth of them."""
+
 
 @dataclass(frozen=True)
 class Overlap:
@@ -79,8 +82,8 @@ def _angles(corners: NDArray) -> NDArray:
     return 2 * np.arctan2(volume, sizes.prod(axis=1) + products)
 
 
-def warn_of_overlap(discretisation: Discretisation, snapshot: Snapshot) -> None:
-    """Warn with OverlapWarning where the body overlaps itself at a snapshot."""
+def warn_of_overlap(discretisation: Discretisation, snapshot: Snapshot) -> bool:
+    """Warn with OverlapWarning where the body overlaps itself at a snapshot; whether it does."""
     found = overlap(discretisation, snapshot)
     if found is not None:
         text = (
@@ -88,3 +91,20 @@ def warn_of_overlap(discretisation: Discretisation, snapshot: Snapshot) -> None:
             "physical. Remedies: end the run before; a bath or supports with which they do not meet."
         )
         warn(OverlapWarning(text))
+    return found is not None
+
+
+class OverlapWatch:
+    """Looks now and then during a run, and at its end; warns once."""
+
+    def __init__(self, discretisation: Discretisation) -> None:
+        self._discretisation, self._found, self._looked = discretisation, False, 0
+
+    def after_step(self, snapshot: Snapshot, solves: int) -> None:
+        """An accepted state, and the solves of the run so far."""
+        if solves >= self._looked + SOLVES:
+            self._looked = solves
+            self.look(snapshot)
+
+    def look(self, snapshot: Snapshot) -> None:
+        self._found = self._found or warn_of_overlap(self._discretisation, snapshot)

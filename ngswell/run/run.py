@@ -13,7 +13,7 @@ from threadpoolctl import threadpool_limits
 
 from ngswell import checks
 from ngswell.analysis.diagnosis import explain
-from ngswell.analysis.overlap import warn_of_overlap
+from ngswell.analysis.overlap import OverlapWatch
 from ngswell.errors import InstabilityError, StepError
 from ngswell.observers.base import Observer
 from ngswell.problem.problem import Problem
@@ -77,6 +77,7 @@ def _run(
         steps.begin(*start.logged)
         stepper = method.stepper(problem, timetable, start.restart)
         guard = Guard(method.unstable, watch, problem, stepper.factorisation.solver, timetable.duration)
+        overlaps = OverlapWatch(problem)
         log = _Log(start, method, stepper, watch, setup_digest(setup) if checkpoint else {}, steps)
         if checkpoint:
             checkpoint.save(log.restart)
@@ -85,6 +86,7 @@ def _run(
                 steps.append(step.report())
                 watch.observe(step)
                 guard.after_step(step.time, timetable.is_kink(step.time) and step.time < timetable.end)
+                overlaps.after_step(stepper.accepted, stepper.factorisation.solver.solves)
                 if checkpoint:
                     checkpoint.after(step.time, log.restart)
         except BaseException as error:
@@ -92,6 +94,7 @@ def _run(
             if checkpoint and (signals.stepping or isinstance(error, InstabilityError)):  # observers agree on the last step
                 checkpoint.save(log.restart)
             if isinstance(error, Failed):
+                overlaps.look(stepper.accepted)
                 raise _step_error(error, problem, stepper, start) from None
             if isinstance(error, StepError):
                 error.end = stepper.accepted
@@ -102,7 +105,7 @@ def _run(
                 checkpoint.save(log.restart)
             if signals.received is None:
                 guard.at_end(stepper.accepted.time)
-    warn_of_overlap(problem, stepper.accepted)
+    overlaps.look(stepper.accepted)
     signals.end(stepper.accepted.time, checkpoint.path if checkpoint else None)
     return log.result(setup)
 

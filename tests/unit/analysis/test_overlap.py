@@ -89,17 +89,31 @@ def covered_twice(problem, snapshot):
     return (times > 1).sum() / (times > 0).sum()
 
 
-def test_a_bilayer_that_curls_into_itself_is_reported_at_the_end():
+def curling(bath):
     layered = replace(TABLE_1, mu=0.1, cfc0=IfPos(y - 0.05, 0.35, 0.02))
-    scene = Scene(
+    return Scene(
         mesh=rectangle(1.2, 0.1, 10, 2), kinematics=PlaneStrain(), material=layered, model=LocalDonnan(),
-        supports=[Roller("left", "xy")], baths=[Bath("top|right|bottom", c=Ramp((0, 2.0), (60, 0.1)))],
-        charge=Ramp((0, 0.0), (10, 1.0)),
+        supports=[Roller("left", "xy")], baths=[Bath("top|right|bottom", c=bath)], charge=Ramp((0, 0.0), (10, 1.0)),
     )  # fmt: skip
-    with pytest.warns(OverlapWarning, match="at t = 100 s the body overlaps itself: ") as caught:
+
+
+def test_a_bilayer_that_curls_into_itself_is_reported():
+    scene = curling(Ramp((0, 2.0), (60, 0.1)))
+    with pytest.warns(OverlapWarning, match="the body overlaps itself: ") as caught:
         end = scene.run(100.0, Adaptive(0.2)).end
-    assert caught[0].filename == __file__
+    assert [warning.filename for warning in caught] == [__file__]  # once
     found, twice = overlap(scene.problem, end), covered_twice(scene.problem, end)
     assert twice > 0.1
     # Each such area belongs to two cells; ten cells along the strip resolve it to one of them at each end and row.
     assert found.cells / found.looked_at == pytest.approx(2 * twice / (1 + twice), abs=0.2)
+
+
+@pytest.mark.parametrize("solves", [100, 10**9])
+def test_one_that_uncurls_again_is_seen_on_the_way(solves, monkeypatch):
+    monkeypatch.setattr("ngswell.analysis.overlap.SOLVES", solves)
+    scene = curling(Ramp((0, 2.0), (60, 0.1), (80, 0.1), (120, 2.0)))
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        end = scene.run(200.0, Adaptive(0.2), unstable="off").end
+    assert overlap(scene.problem, end) is None
+    assert [warning.category for warning in caught] == [OverlapWarning] * (solves == 100)  # control: a look at the end only
