@@ -96,7 +96,10 @@ def _check_agreement(everything: list[Held], pins: list[tuple[int, str]], surrou
         for vertex in vertices_of(surroundings.mesh, one.boundary):
             other = found.setdefault((vertex, one.direction), one)
             if not one.agrees(other):
-                raise InputError(f"{other} and {one} hold {_where(surroundings, vertex, one.direction)} differently")
+                raise InputError(
+                    f"{other} and {one} hold {_where(surroundings, vertex, one.direction)} differently: leave one of them "
+                    "out, or give both the same displacement"
+                )
     for vertex, direction in pins:
         if (vertex, direction) in found and (other := found[vertex, direction]).moves:
             raise InputError(
