@@ -21,7 +21,7 @@ class OutputError(NgswellError, OSError):
 
 
 class OverlapWarning(UserWarning):
-    """A state in which the body overlaps itself."""
+    """A state in which the body overlaps itself, or lies within an obstacle."""
 
 
 class ExtrapolationWarning(UserWarning):

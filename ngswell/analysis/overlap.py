@@ -1,4 +1,4 @@
-"""Whether a deformed body covers some place twice: contact is not modelled, so nothing keeps its parts apart."""
+"""Whether a deformed body covers some place twice, where nothing keeps its parts apart, or is within an obstacle."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ def _angles(corners: NDArray) -> NDArray:
 
 
 def warn_of_overlap(discretisation: Discretisation, snapshot: Snapshot) -> bool:
-    """Warn with OverlapWarning where the body overlaps itself at a snapshot; whether it does."""
+    """Warn with OverlapWarning where the body overlaps itself, or what a load acts from, at a snapshot; whether it does."""
     found = overlap(discretisation, snapshot)
     if found is not None:
         text = (
@@ -91,7 +91,12 @@ def warn_of_overlap(discretisation: Discretisation, snapshot: Snapshot) -> bool:
             "physical. Remedies: end the run before; a bath or supports with which they do not meet."
         )
         warn(OverlapWarning(text))
-    return found is not None
+    loads = discretisation.setup.loads
+    state = discretisation.state_at(snapshot) if loads else None
+    amiss = list(filter(None, (load.amiss(state, snapshot.time) for load in loads)))
+    for what in amiss:
+        warn(OverlapWarning(f"at t = {snapshot.time:.10g} s {what}"))
+    return found is not None or bool(amiss)
 
 
 class OverlapWatch:

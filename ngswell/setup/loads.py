@@ -29,7 +29,8 @@ class Load(Protocol):
     3. `schedules`: the histories that it follows, if any; `clock.follow(history)` makes the field that a term takes;
     4. `fluid_weight`: a body force on the fluid [N/mm³], which also drives seepage, if it has one: numbers or histories;
     5. `flows`: its terms of the other balances, if it has any, with `Role.EFFLUX` what leaves through a boundary;
-    6. `check_start`: its refusals of the fields that a run goes on from, if any.
+    6. `check_start`: its refusals of the fields that a run goes on from, if any;
+    7. `amiss`: what it finds not physical in a result, if anything.
     """
 
     schedules: tuple[Schedule, ...] = ()
@@ -40,6 +41,10 @@ class Load(Protocol):
     def check_start(self, state: Any, time: float) -> None:
         """Refuse fields, the model's `state` at `time` [s]."""
         return
+
+    def amiss(self, state: Any, time: float) -> str | None:
+        """What is not physical in the model's `state` at `time` [s], and the remedy: said once a run."""
+        return None
 
     def terms(self, state: Any, v: CoefficientFunction, clock: Clock) -> list[Term]:
         """Less the power of the load over the test displacement `v`; `state` holds the trial functions.

@@ -40,9 +40,10 @@ class Obstacle(Load):
     reference area along grad d: a penalty, k = `penalty` (2µ + λ)/h, h the size of the cells normal to the boundary. What it
     is pressed in by is p h/[penalty (2µ + λ)] under a pressure p. `displacement` [mm] is one number or history a direction.
 
-    Only this boundary touches. Where it has a bath, fluid and salt pass as before: the obstacle is porous. Elsewhere it is
-    sealed. An obstacle does not hold a body: supports do. Raises InputError for an obstacle that overlaps the body at the
-    start, that pushes only where supports hold, or that has no meaning in the motion.
+    Only this boundary touches; `OverlapWarning` says where another one is within the obstacle. Where it has a bath, fluid
+    and salt pass as before: the obstacle is porous. Elsewhere it is sealed. An obstacle does not hold a body: supports do.
+    Raises InputError for an obstacle that overlaps the body at the start, that pushes only where supports hold, or that has
+    no meaning in the motion.
     """
 
     boundary: str
@@ -94,17 +95,38 @@ class Obstacle(Load):
             if all(name in fixed[direction].split("|") for direction in pushed):
                 raise InputError(f"Obstacle on {name!r}: a support holds it where the obstacle pushes, so it has no effect")
 
+    def amiss(self, state: Any, time: float) -> str | None:
+        """Whether a boundary that does not touch it is within it."""
+        mesh, own = state.mesh, self.boundary.split("|")
+        for name in sorted(set(mesh.GetBoundaries()) - set(own)):
+            found = self._overlap(mesh, name, state.u, time, PRESSED / self.penalty)
+            if found is not None:
+                depth, where = found
+                return (
+                    f"{name!r} is {depth:.3g} mm within the obstacle on {self.boundary!r} near {where} mm of the undeformed "
+                    f"body: only {self.boundary!r} touches it. Remedy: Obstacle('{self.boundary}|{name}', ...)"
+                )
+        return None
+
     def _check_overlap(self, mesh: Mesh, u: CoefficientFunction, time: float, share: float) -> None:
         """Refuse to start within the obstacle, by more than a share of a cell."""
-        at = [start + history.at(time) for start, history in zip(self.shape.at, self.schedules, strict=True)]
-        gaps = _on(mesh, self.boundary, self.shape.gap(_seen_from(mesh, at) + u)[0]).ravel()
-        worst = int(np.argmin(gaps))
-        if not gaps[worst] >= -share * cell_size(mesh, self.boundary):
-            where = place(_on(mesh, self.boundary, _seen_from(mesh, (0.0,) * mesh.dim))[worst])
+        found = self._overlap(mesh, self.boundary, u, time, share)
+        if found is not None:
             raise InputError(
-                f"Obstacle on {self.boundary!r}: at the start ({time:g} s) it overlaps the body by {-gaps[worst]:.3g} mm "
-                f"near {where} mm; let it start where it touches at most, and move it from there"
+                f"Obstacle on {self.boundary!r}: at the start ({time:g} s) it overlaps the body by {found[0]:.3g} mm "
+                f"near {found[1]} mm; let it start where it touches at most, and move it from there"
             )
+
+    def _overlap(
+        self, mesh: Mesh, boundary: str, u: CoefficientFunction, time: float, share: float
+    ) -> tuple[float, str] | None:
+        """How far [mm] a boundary is within the obstacle, and where most, if by more than a share of a cell."""
+        at = [start + history.at(time) for start, history in zip(self.shape.at, self.schedules, strict=True)]
+        gaps = _on(mesh, boundary, self.shape.gap(_seen_from(mesh, at) + u)[0]).ravel()
+        worst = int(np.argmin(gaps))
+        if gaps[worst] >= -share * cell_size(mesh, self.boundary):
+            return None
+        return -gaps[worst], place(_on(mesh, boundary, _seen_from(mesh, (0.0,) * mesh.dim))[worst])
 
     def terms(self, state: Any, v: CoefficientFunction, clock: Clock) -> list[Term]:
         mesh, material = state.mesh, state.material

@@ -14,6 +14,7 @@ from ngswell import (
     InputError,
     LocalDonnan,
     Obstacle,
+    OverlapWarning,
     PlaneStrain,
     Ramp,
     Reaction,
@@ -137,6 +138,20 @@ def test_an_obstacle_put_into_a_deformed_body_is_refused():
         below(height - 0.01).run(1.0, Fixed(1.0))
     pressed = below(height + 0.01).run(1.0, Fixed(1.0)).end
     below(height + 0.01).run(2.0, Fixed(1.0), resume=pressed)
+
+
+def test_a_side_within_an_obstacle_that_it_does_not_touch_is_told():
+    """A gel that swells sideways into a wall, which only its top would touch."""
+    wall = RigidPlane((1.02, 0.0), (-1.0, 0.0))
+    with pytest.warns(OverlapWarning, match=r"'right' is \S+ mm within the obstacle on 'top' near .*'top\|right'"):
+        scene(Obstacle("top", wall)).equilibrate()
+
+    def bulge(gel):
+        state = gel.state(gel.equilibrate())
+        return max(state.at((1.0, height), "displacement")[0] for height in np.linspace(0.1, 1.0, 10))
+
+    # What it advises, without a warning: a penalty of 1000 yields by thousandths of a cell of 0.5 mm.
+    assert bulge(scene(Obstacle("top|right", wall))) < 0.021 < 0.03 < bulge(scene())
 
 
 def test_reaction_asks_for_something_to_push_at():
