@@ -66,14 +66,15 @@ def confined(material=SOFT, height=1.0, grade=("top", "bottom"), **pieces):
 
 
 def in_its_steps(scene, largest):
-    """The end in steps of backward Euler as the suite chooses them: the first 0.1 s, each √5 times the one before (its rule
-    for two iterations), up to `largest`. It counts 27, 28 and 62 of them where these are 27, 28 and 56."""
-    end, time, step = None, 0.0, 0.1 / sqrt(5)
+    """The end in steps of backward Euler as the suite takes them: the first 0.1 s, each nearer to the largest there by
+    a fifth of what is missing, at most five times as long. As many as it counts: 27 in bp13, 62 in bp05, 82 in bp15."""
+    end, time, step = None, 0.0, 0.0
     for until, most in largest:
         while time < until:
-            step = min(step * sqrt(5), most, until - time)
+            step = min(step + (most - step) / 5, 5 * step) if step else 0.1
+            taken = min(step, until - time)
             time = until if step > until - time - 1e-9 else time + step
-            end = scene.run(until=time, steps=Fixed(step), resume=end).end
+            end = scene.run(until=time, steps=Fixed(taken), resume=end).end
     return scene.state(end)
 
 
@@ -116,21 +117,21 @@ def test_bp12_permeation_of_a_body_free_upstream():
 
 
 def test_bp13_permeation_under_a_given_flux():
-    """The suite's last steps of 100 s leave more of the transient than is true, 5e-4; in such steps 2e-4 remain."""
+    """The suite's last steps of 100 s leave more of the transient than is true, 5e-4; in such steps 4e-5 remain."""
     loads = [Efflux("bottom", fluid=Ramp((0, 0.0), (1, -2e-4)))]
     scene = confined(supports=[Roller("bottom|top", "x")], baths=[Bath("top")], loads=loads)
     end = in_its_steps(scene, [(1.0, 0.1), (1000.0, 100.0)])
-    assert norm(end, PERMEATED, [0, -1], [-1]) == pytest.approx(1.16349820173, rel=4e-4)
+    assert norm(end, PERMEATED, [0, -1], [-1]) == pytest.approx(1.16349820173, rel=1e-4)
 
 
 def test_bp14_permeation_under_a_given_flux_of_the_mixture():
     """The free end bears no effective traction and lets 2e-4 mm/s in, solid and fluid together. What comes in leaves at the
     other end, where p = 0 besides: so that flux is given there, and p counted from there. In exact time 1.4e-2 off: not at
-    rest, slow, and steps of 100 s; a step more or less is 3e-3."""
+    rest, slow, and steps of 100 s; 5e-4 in such steps."""
     loads = [Efflux("top", fluid=Ramp((0, 0.0), (1, 2e-4)))]
     scene = confined(supports=[Roller("top", "x")], baths=[Bath("bottom")], loads=loads)
     end = in_its_steps(scene, [(1.0, 0.1), (1000.0, 100.0)])
-    assert norm(end, PERMEATED, [-1], [-1], shift=end.at((1.0,), "p")) == pytest.approx(1.1440959247, rel=5e-3)
+    assert norm(end, PERMEATED, [-1], [-1], shift=end.at((1.0,), "p")) == pytest.approx(1.1440959247, rel=1e-3)
 
 
 def test_bp23_creep_under_its_own_weight():
@@ -155,11 +156,11 @@ PRESSED = [Traction("top", (Ramp((0, 0.0), (0.1, -0.2)),))]
 
 
 def test_bp15_stress_relaxation_of_two_bricks():
-    """Pressed by 0.5 mm in 500 s. At 3000 s the number is 8.0e-4 from that of rest, here 8.9e-4, in exact time 3.7e-4."""
+    """Pressed by 0.5 mm in 500 s. At 3000 s the number is 8.0e-4 from that of rest, here 7.9e-4, in exact time 3.7e-4."""
     press = Roller("top", "x", displacement=Ramp((0, 0.0), (500, -0.5)))
     steps = [(500.0, 20.0), (1000.0, 20.0), (3000.0, 100.0)]
     u, p = bricks(STIFFENING, mirrored(1.4, 10), graded(1.18, 20), steps, supports=[press])
-    assert 2 * sqrt(u[:-1] @ u[:-1] + p @ p) == pytest.approx(3.18388020597, rel=5e-5)
+    assert 2 * sqrt(u[:-1] @ u[:-1] + p @ p) == pytest.approx(3.18388020597, rel=2e-5)
     rest = 0.25 * np.append(mirrored(1.4, 10), 1 + graded(1.18, 20))[:-1]
     assert 3.18388020597 - 2 * sqrt(rest @ rest) > 2e-4 * 3.18388020597  # control: at rest the number is another
 
@@ -167,7 +168,7 @@ def test_bp15_stress_relaxation_of_two_bricks():
 def test_bp16_creep_of_two_bricks():
     """Steps of up to 1000 s: in exact time 1.4e-3 off."""
     u, p = bricks(STIFFENING, mirrored(1.4, 10), graded(1.18, 20), DECADES, loads=PRESSED)
-    assert 2 * sqrt(u @ u + p @ p) == pytest.approx(2.35761300143, rel=1e-3)
+    assert 2 * sqrt(u @ u + p @ p) == pytest.approx(2.35761300143, rel=5e-5)
 
 
 def test_bp22_creep_of_two_bricks_under_a_rigid_plate():
@@ -187,7 +188,7 @@ def test_bp05_unconfined_stress_relaxation():
     end, radii = in_its_steps(scene, DECADES), 3 * graded(0.87, 30)
     u = np.array([end.at((r, 0.5), "displacement")[0] for r in radii])
     p = np.array([end.at((r, 0.5), "p") for r in radii])
-    assert sqrt(4 * (u @ u + p[1:-1] @ p[1:-1]) + 2 * p[0] ** 2) == pytest.approx(0.641174414143, rel=1e-2)
+    assert sqrt(4 * (u @ u + p[1:-1] @ p[1:-1]) + 2 * p[0] ** 2) == pytest.approx(0.641174414143, rel=5e-4)
 
 
 def test_bp10_tube_under_pressure():
@@ -203,16 +204,82 @@ def test_bp10_tube_under_pressure():
     assert sqrt(18 * (u @ u + p @ p)) == pytest.approx(9.96475911085, rel=1e-2)
 
 
+def solute(E, D, theta):
+    """A body with salt whose ions are alike: it diffuses as a neutral solute does, and moves nothing."""
+    return material(E, 0.0, LogNeoHookean(), K=1e-3, cfc0=0.0, D_plus=D, D_minus=D, theta=theta * PER_THETA)
+
+
+SALTED = Ramp((0, 1e-9), (0.1, 1e-3))
+"""1 mmol/l, where there was nothing."""
+
+
+def diffused(height, salted, pieces, largest, places, mass):
+    """Displacements, effective pressures p − Rθ c and concentrations [mmol/l] at the end."""
+    mesh = column(height, round(40 * height), grade=dict.fromkeys(salted, 20))
+    scene = Scene(mesh=mesh, kinematics=Confined(), material=mass, initial=(1e-9, 0.0), **pieces)
+    end = in_its_steps(scene, largest)
+    c = 1e3 * along(end, "c_plus", places)
+    return along(end, "displacement", places), along(end, "p", places) - 8.3144e-6 * mass.theta * c, c
+
+
 def test_bs01_diffusion_of_a_neutral_solute():
-    """1 mmol/l of salt whose ions are alike diffuses as a neutral solute does, and moves nothing. Exact time: 1.6e-3 off."""
-    m = material(1.0, 0.0, HolmesMowSolid(0.0), K=1e-3, cfc0=0.0, D_plus=1e-3, D_minus=1e-3, theta=298 * PER_THETA)
-    bath, scale = Bath("top", c=Ramp((0, 1e-9), (0.1, 1e-3))), 1 + (8.314e-6 * 298) ** 2  # the pressure −Rθ c counts
-    scene = Scene(
-        mesh=column(1.0, 40, grade={"top": 20}), kinematics=Confined(), material=m, supports=[Roller("bottom", "x")],
-        baths=[bath], initial=(1e-9, 0.0),
-    )  # fmt: skip
-    c = 1e3 * along(in_its_steps(scene, [(2000.0, 100.0)]), "c_plus", graded(0.8, 20)[:-1])
-    assert 2 * sqrt(scale * c @ c) == pytest.approx(8.90402691652, rel=5e-4)
+    """In exact time 1.6e-3 off."""
+    pieces = {"supports": [Roller("bottom", "x")], "baths": [Bath("top", c=SALTED)]}
+    _, p, c = diffused(1.0, ["top"], pieces, [(2000.0, 100.0)], graded(0.8, 20)[:-1], solute(1.0, 1e-3, 298))
+    assert 2 * sqrt(p @ p + c @ c) == pytest.approx(8.90402691652, rel=1e-4)
+
+
+def test_bs06_a_neutral_solute_diffuses_in_while_two_bricks_creep():
+    """bp22 with a solute that fluid carries at half its speed; here it carries it at its own. Nearly at rest, 4e-4 from it:
+    c lacks 1e-3 of the bath's on average; by the suite's number about half of that, perhaps as less of it is washed out."""
+    pieces = {"supports": [Roller("bottom", "x")], "baths": [Bath("bottom", c=SALTED)], "loads": PRESSED}
+    places = np.append(mirrored(1.25, 10), 1 + mirrored(1.25, 10))[1:]
+    u, p, c = diffused(2.0, ["bottom"], pieces, DECADES, places, solute(1.0, 1e-3, 293))
+    u[20:] += 0.001
+    assert sqrt(4 * (u[:-1] @ u[:-1] + p @ p + c @ c) + u[-1] ** 2) == pytest.approx(13.0764611559, rel=1e-3)
+
+
+def test_bs07_a_neutral_solute_diffuses_through_two_bricks():
+    """Held, so that fluid rests. At rest the number is 1.5e-4 greater, in exact time 8e-5."""
+    held = [Roller("bottom", "x"), Roller("top", "x", displacement=Ramp((0, 0.0), (0.1, -0.001)))]
+    pieces = {"supports": held, "baths": [Bath("bottom", c=SALTED)]}
+    places, largest = np.append(mirrored(1.4, 10), 1 + graded(1.18, 20))[1:], [*DECADES[:-1], (1e4, 100.0), (3e4, 1e3)]
+    u, p, c = diffused(2.0, ["bottom"], pieces, largest, places, solute(10.0, 5e-4, 298))
+    assert 2 * sqrt(u[:-1] @ u[:-1] + p @ p + c @ c) == pytest.approx(12.8042982118, rel=2e-6)
+    assert 2 * sqrt(len(places)) - 12.8042982118 > 1e-4 * 12.8042982118  # control: at rest the number is another
+
+
+def test_bs08_a_given_flux_of_a_neutral_solute():
+    """4e-4 mmol/l mm/s through 0.8 of 5e-4 mm²/s: 1 mmol/l over 1 mm, while fluid rests. In exact time 1.4e-4 off.
+    The suite's solute drags the solid, which this one does not: strains up to Rθ c/E = 2e-3, perhaps the 4e-5 left."""
+    flux = Efflux("bottom", cations=Ramp((0, 0.0), (1, -4e-7)))
+    pieces = {"supports": [Roller("top", "x")], "baths": [Bath("top", c=1e-9)], "loads": [flux]}
+    largest = [(2.0, 0.1), (11.0, 1.0), (101.0, 10.0), (1001.0, 100.0), (1e4, 1e3)]
+    _, _, c = diffused(1.0, ["bottom", "top"], pieces, largest, mirrored(1.5, 10)[:-1], solute(1.0, 5e-4, 293))
+    assert 2 * sqrt(c @ c) == pytest.approx(5.93442507258, rel=1e-4)
+    assert c[0] == pytest.approx(1.0, rel=2e-4)  # by hand
+
+
+@pytest.mark.parametrize(("last", "number"), [(1, 161.894258745), (5, 161.894273762)])
+def test_mp12_mp13_permeation_that_has_washed_a_solute_out(last, number):
+    """15 mm of water through 10 mm, free of solute where it comes in: what is left is the permeation, p up to a tenth of E.
+    Steady; the mesh, which is also the suite's 200 cells, the last of them in five in mp13: 3e-6 on 40 cells and on 80."""
+    smooth = Ramp(*[(t / 10, -((t / 10) ** 2) * (3 - t / 5)) for t in range(11)])
+    stiff = material(100.0, 0.0, LogNeoHookean(), K=1.0)
+    pieces = {"supports": [Roller("bottom|top", "x")], "baths": [Bath("top")], "loads": [Efflux("bottom", fluid=smooth)]}
+    scene = Scene(mesh=column(10.0, 40), kinematics=Confined(), material=stiff, model=Uncharged(), **pieces)
+    end = scene.run(until=15, steps=ACCURATE).state
+    places = np.append(np.linspace(0, 9.95, 200), np.linspace(9.95, 10, last + 1)[1:])
+    assert norm(end, places, [0, -1], [-1]) == pytest.approx(number, rel=1e-5)
+    assert end.at((0.0,), "p") == pytest.approx(10.0, rel=1e-5)  # by hand
+
+
+def test_bp26_permeation_under_a_given_flow():
+    """As bp13, at a fifth of the flux, after 100 s of a transient that takes as long."""
+    smooth = Ramp(*[(t / 10, -4e-5 * (t / 10) ** 2 * (3 - t / 5)) for t in range(11)])
+    scene = confined(supports=[Roller("bottom|top", "x")], baths=[Bath("top")], loads=[Efflux("bottom", fluid=smooth)])
+    end = scene.run(until=100, steps=ACCURATE).state
+    assert norm(end, mirrored(1.2, 15), [0, -1], [-1]) == pytest.approx(0.190810142228, rel=2e-2)
 
 
 def test_mp01_confined_stress_relaxation_of_a_charged_column():
