@@ -1,8 +1,8 @@
-"""The force on a boundary that is held or touches an obstacle, from the balance of momentum."""
+"""The force on what a boundary is held by, touches or is pressed by, from the balance of momentum."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ngswell import checks
 from ngswell.errors import InputError
 from ngswell.mesh.points import vertices_of
-from ngswell.models.term import Role
+from ngswell.models.term import Role, Term
 from ngswell.observers.records import Recorder, power_of_mm
 from ngswell.problem.forms import form
 from ngswell.problem.problem import Problem
@@ -33,13 +33,14 @@ class Reaction(Recorder):
     All held boundaries together bear the sum of the loads, a bath's pressure among them, to what the solves leave (along r
     the hoop stress bears a share). Directions that are not held have 0. A vertex that several held boundaries share counts,
     in each direction, with the one whose support stands first in the scene; a pinned vertex counts with the first held
-    boundary that it is on, and with none if it is on none. What obstacles bear on the boundary is added.
+    boundary that it is on, and with none if it is on none. What obstacles bear on the boundary is added. On a boundary that
+    nothing holds or touches, the force is what the pressure of its bath bears.
 
     `values` has one row a time: N/mm² in a column, N per mm of thickness in plane strain or length of a cylinder, N in
     space, and N on the whole circumference, 2π, when axisymmetric; along r that is the sum of the radial forces. At a
     start out of balance it is that of the fields as they are. With `to`, a path or a `CSV`, records go to that file;
-    `dense` as in `Probe`. Raises InputError for a boundary on which nothing is held and that no
-    obstacle may touch.
+    `dense` as in `Probe`. Raises InputError for a boundary on which nothing is held, that no obstacle may touch and no bath
+    presses on.
     """
 
     def __init__(
@@ -55,19 +56,15 @@ class Reaction(Recorder):
 
     def prepare(self, problem: Problem, begin: float, until: float) -> None:
         names, owners = problem.setup.check_boundary("Reaction", self.boundary), _owners(problem.setup)
-        pushed = [
-            replace(term, boundary=name)
-            for term in problem.terms
-            if term.role is Role.CONTACT and term.boundary is not None
-            for name in term.boundary.split("|")
-        ]
-        touching = {term.boundary for term in pushed}
+        held, touching = set(owners.values()), list(_touching(problem))
+        met = {term.boundary for term in touching}
+        pressed = [term for term in _pressed(problem) if term.boundary not in held | met]
+        pushed = [*touching, *pressed]
         for name in names:
-            if name not in owners.values() and name not in touching:
-                held = ", ".join(sorted(map(repr, set(owners.values())))) or "none"
-                met = ", ".join(sorted(map(repr, touching))) or "none"
+            if name not in held | {term.boundary for term in pushed}:
                 raise InputError(
-                    f"Reaction: nothing is held on {name!r}; held boundaries are {held}, those with an obstacle {met}"
+                    f"Reaction: nothing is held on {name!r}; held boundaries are {_listed(held)}, those with an obstacle "
+                    f"{_listed(met)}, those that a bath alone presses on {_listed({term.boundary for term in pressed})}"
                 )
         directions = problem.kinematics.directions
         displacement = problem.ranges[problem.names[0]]
@@ -117,6 +114,25 @@ def _owners(setup: Setup) -> dict[tuple[int, str], str]:
             if vertex in vertices[name]:
                 owners.setdefault((vertex, direction), name)
     return owners
+
+
+def _touching(problem: Problem) -> Iterator[Term]:
+    """What pushes back at single boundaries that touch obstacles."""
+    for term in problem.terms:
+        if term.role is Role.CONTACT and term.boundary is not None:
+            yield from (replace(term, boundary=name) for name in term.boundary.split("|"))
+
+
+def _pressed(problem: Problem) -> Iterator[Term]:
+    """What baths press single boundaries with."""
+    trials, tests = (list(functions) for functions in problem.space.TnT())
+    for bath in problem.setup.baths:
+        for term in bath.loads(problem.kinematics, trials[0], tests[0], problem.baths[bath.boundary]):
+            yield from (replace(term, boundary=name) for name in bath.boundary.split("|"))
+
+
+def _listed(names: Iterable[str | None]) -> str:
+    return ", ".join(sorted(map(repr, names))) or "none"
 
 
 def _held(setup: Setup) -> Iterator[tuple[str, str]]:

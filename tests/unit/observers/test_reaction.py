@@ -128,6 +128,24 @@ def test_measures_and_walls(motion):
         assert found["right"].values[-1, 0] == pytest.approx((rest.p - solid) * J * side, rel=1e-8)
 
 
+def test_what_a_bath_bears():
+    """What holds the body and the baths that press on it bear nothing together, as there is no other load."""
+    scene = clamped(baths=[Bath("top|left|right", c=0.15, P=0.01)], loads=[])
+    base, baths = at_rest(scene, "bottom", "top|left|right")
+    assert base + baths == pytest.approx([0.0, 0.0], abs=BALANCED)
+    assert baths == pytest.approx([0.0, 0.01], abs=1e-14)  # P times the way between the ends of the clamped base, turned
+
+
+@pytest.mark.parametrize("motion", MOTIONS)
+def test_what_a_bath_bears_in_its_measure(motion):
+    mesh, kinematics, supports, base, _, _ = MOTIONS[motion]
+    scene = Scene(
+        mesh=mesh(), kinematics=kinematics, material=TABLE_2, model=LocalDonnan(), supports=supports,
+        baths=[Bath("top", c=0.3, P=0.05)],
+    )  # fmt: skip
+    assert at_rest(scene, "top")[0][-1] == pytest.approx(0.05 * base, rel=1e-12)
+
+
 def test_it_follows_a_run(tmp_path):
     base, kept = Reaction("bottom"), Reaction("bottom", when=[20.0], to=tmp_path / "base.csv")
     scene = clamped(model=Potential(), loads=[Traction("top", (0.0, Ramp((0, 0.0), (20, -0.02))))], charge=Ramp((0, 0.0)))
