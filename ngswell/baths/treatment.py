@@ -72,6 +72,10 @@ class Surroundings(Protocol):
         """The names in `boundary` ("a|b"); InputError for one that the mesh does not have."""
         ...
 
+    def check_surface(self, what: str, boundary: str) -> list[str]:
+        """The same, of the surface of the body; InputError for one inside it."""
+        ...
+
 
 @runtime_checkable
 class Treatment(Protocol):

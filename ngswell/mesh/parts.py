@@ -46,6 +46,23 @@ class Sides:
         pieces = [(side, piece) for side, these in enumerate(self.corners) for piece in combinations(these, self.mesh.dim)]
         return np.array([side for side, _ in pieces]), np.array([piece for _, piece in pieces])
 
+    @cached_property
+    def _surface(self) -> set[frozenset[int]]:
+        return {frozenset(corners) for corners in self.corners}
+
+    def of_surface(self, what: str, names: list[str]) -> list[str]:
+        """The names, of single boundaries; InputError for one that lies inside the body: what acts from outside has no side
+        there."""
+        for name in names:
+            for side in self.mesh.Boundaries(name).Elements():
+                if frozenset(vertex.nr for vertex in side.vertices) not in self._surface:
+                    where = place(np.mean([self.mesh[vertex].point for vertex in side.vertices], axis=0))
+                    raise InputError(
+                        f"{what}: boundary {name!r} is inside the body near {where} mm, where it can be observed or held; "
+                        "baths, flows, pressures and obstacles need its surface"
+                    )
+        return names
+
     def jumps(self, field: CoefficientFunction, share: float) -> bool:
         """Whether values of a field in two neighbouring cells are further apart than all of those inside both, by more than
         that share of its largest value: no smooth field that the cells resolve does so."""

@@ -53,7 +53,7 @@ class Efflux(Load):
 
     def check_in(self, surroundings: Surroundings) -> None:
         what = f"Efflux on {self.boundary!r}"
-        names = surroundings.check_boundary("Efflux", self.boundary)
+        names = surroundings.check_surface("Efflux", self.boundary)
         for name in names:
             if any(name in bath.boundary.split("|") for bath in surroundings.baths):
                 raise InputError(f"{what}: {name!r} has a bath, which decides what leaves there; leave one of them out")

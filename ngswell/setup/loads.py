@@ -142,7 +142,7 @@ class Pressure(Load):
 
     def check_in(self, surroundings: Surroundings) -> None:
         fixed = surroundings.fixed()
-        for name in surroundings.check_boundary("Pressure", self.boundary):
+        for name in surroundings.check_surface("Pressure", self.boundary):
             along = _normal_directions(surroundings, name)
             if all(name in fixed[direction].split("|") for direction in along):
                 raise InputError(f"Pressure on {name!r}: a support holds it along its normal, so it has no effect")

@@ -71,7 +71,7 @@ class Obstacle(Load):
         checks.set_fields(self, schedules=histories)
 
     def check_in(self, surroundings: Surroundings) -> None:
-        names, kinematics = surroundings.check_boundary("Obstacle", self.boundary), surroundings.kinematics
+        names, kinematics = surroundings.check_surface("Obstacle", self.boundary), surroundings.kinematics
         if len(self.shape.at) != kinematics.dimension:
             raise InputError(f"Obstacle: {self.shape!r} needs {kinematics.dimension} coordinates [mm]")
         self.shape.check(kinematics)

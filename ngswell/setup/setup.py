@@ -66,9 +66,8 @@ class Setup:
             raise InputError(
                 f"{type(self.kinematics).__name__} needs a {self.kinematics.dimension}-d mesh, this one is {self.mesh.dim}-d"
             )
-        checks.set_fields(self, mesh_shape=MeshShape.of(self.mesh))
         check_cells(self.mesh)
-        checks.set_fields(self, sides=Sides(self.mesh))
+        checks.set_fields(self, mesh_shape=MeshShape.of(self.mesh), sides=Sides(self.mesh))
         check_sides(self.sides)
         self.material.check_on(self.mesh)
         self.model.check(self.material, self.baths)
@@ -99,8 +98,7 @@ class Setup:
         motions = "Confined(), Cylindrical(), Spherical(), PlaneStrain(), Axisymmetric() or Spatial()"
         checks.instance("kinematics", self.kinematics, Kinematics, motions)
         checks.instance("material", self.material, Material, "a Material(...)")
-        models = "Potential(), Concentration(), LocalDonnan() or Uncharged()"
-        checks.instance("model", self.model, Model, models)
+        checks.instance("model", self.model, Model, "Potential(), Concentration(), LocalDonnan() or Uncharged()")
         checks.instance("charge", self.charge, Ramp, "a Ramp of factors on cfc0, such as Ramp((0, 0.0), (4000, 1.0))")
         checks.set_fields(
             self,
@@ -136,6 +134,10 @@ class Setup:
                 raise InputError(f"{what}: boundary {name!r} has characters that NGSolve reads as a pattern; rename it")
         return names
 
+    def check_surface(self, what: str, boundary: str) -> list[str]:
+        """The same, of the surface of the body; InputError for one inside it."""
+        return self.sides.of_surface(what, self.check_boundary(what, boundary))
+
     def _check_jumps(self) -> None:
         """Refuse a charge that jumps where the model has a continuous field for it: no mesh brings it to the right rest."""
         charge = self.material.cfc0
@@ -150,7 +152,7 @@ class Setup:
     def _check_baths(self) -> None:
         taken: set[str] = set()
         for bath in self.baths:
-            for name in self.check_boundary("bath", bath.boundary):
+            for name in self.check_surface("bath", bath.boundary):
                 if name in taken:
                     raise InputError(f"bath on {bath.boundary!r}: boundary {name!r} already has a bath")
                 taken.add(name)

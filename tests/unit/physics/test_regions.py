@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from netgen.occ import Glue, MoveTo, Rectangle, Y
 from ngsolve import IfPos, x
 
 from ngswell import (
@@ -12,22 +13,28 @@ from ngswell import (
     Bath,
     Concentration,
     Confined,
+    Efflux,
     Fixed,
     InputError,
+    Integral,
     LocalDonnan,
     MackieMeares,
     Material,
     Multiplier,
     Nitsche,
+    Obstacle,
     Penalty,
     PlaneStrain,
     Potential,
     PowerLaw,
+    Pressure,
     Ramp,
+    RigidPlane,
     Roller,
     Scene,
     by_region,
     column,
+    from_occ,
     rectangle,
 )
 from ngswell.closed_forms.homogeneous import homogeneous_equilibrium
@@ -159,3 +166,28 @@ def test_a_charge_that_jumps_needs_a_model_that_can(charge):
         bilayer(replace(TABLE_1, cfc0=field), model=Concentration())
     bilayer(replace(TABLE_1, cfc0=field))
     bilayer(replace(TABLE_1, cfc0=0.2 + 0.8 * x * x), model=Concentration())  # smooth, though it doubles
+
+
+def test_what_acts_from_outside_needs_the_surface():
+    """A bath, a flow, a pressure or an obstacle has no side on the interface of two regions; it may be observed and held."""
+    core, skin = Rectangle(1, 0.5).Face(), MoveTo(0, 0.5).Rectangle(1, 0.5).Face()
+    core.edges.Min(Y).name, core.edges.Max(Y).name, skin.edges.Max(Y).name = "bottom", "interface", "top"
+    mesh = from_occ(Glue([core, skin]), 0.5)
+
+    def scene(bath="top", supports=(), loads=()):
+        return Scene(
+            mesh=mesh, kinematics=PlaneStrain(), material=TABLE_1, model=LocalDonnan(), baths=[Bath(bath, c=0.15)],
+            supports=[Roller("bottom", "xy"), *supports], loads=loads,
+        )  # fmt: skip
+
+    for make in (
+        lambda: scene("interface"),
+        lambda: scene(loads=[Pressure("interface", 0.1)]),
+        lambda: scene(loads=[Efflux("interface", 1e-6)]),
+        lambda: scene(loads=[Obstacle("interface", RigidPlane((0.0, 2.0), (0.0, -1.0)))]),
+    ):
+        with pytest.raises(InputError, match="boundary 'interface' is inside the body near"):
+            make()
+    observed = Integral("J", "interface")
+    scene(supports=[Roller("interface", "x")]).equilibrate(observers=[observed])
+    assert observed.values[-1] > 1
