@@ -105,10 +105,11 @@ def _owners(setup: Setup) -> dict[tuple[int, str], str]:
     """The boundary with which each held pair of a vertex and a direction counts."""
     owners: dict[tuple[int, str], str] = {}
     vertices: dict[str, set[int]] = {}
-    for direction, name in _held(setup):
-        vertices.setdefault(name, vertices_of(setup.mesh, name))
-        for vertex in vertices[name]:
-            owners.setdefault((vertex, direction), name)
+    for one in setup.held():
+        for name in one.boundary.split("|"):
+            vertices.setdefault(name, vertices_of(setup.mesh, name))
+            for vertex in vertices[name]:
+                owners.setdefault((vertex, one.direction), name)
     for vertex, direction in setup.pins():
         for name in vertices:
             if vertex in vertices[name]:
@@ -133,11 +134,3 @@ def _pressed(problem: Problem) -> Iterator[Term]:
 
 def _listed(names: Iterable[str | None]) -> str:
     return ", ".join(sorted(map(repr, names))) or "none"
-
-
-def _held(setup: Setup) -> Iterator[tuple[str, str]]:
-    """Directions and the single boundaries on which supports hold them, in the order of the scene."""
-    for support in setup.supports:
-        for direction, boundary in support.fixed(setup).items():
-            for name in filter(None, boundary.split("|")):
-                yield direction, name

@@ -75,7 +75,7 @@ class Obstacle(Load):
         if len(self.shape.at) != kinematics.dimension:
             raise InputError(f"Obstacle: {self.shape!r} needs {kinematics.dimension} coordinates [mm]")
         self.shape.check(kinematics)
-        sideways = kinematics.dimension == 2 and not checks.is_number(kinematics.weight) and any(self.schedules[0].values)
+        sideways = kinematics.dimension == 2 and kinematics.power == 3 and any(self.schedules[0].values)
         if sideways and not checks.is_a(self.shape, RigidPlane):
             raise InputError("Obstacle: axisymmetric it moves along the axis only: its displacement along r has to be 0.0")
         self._check_held(names, surroundings)
@@ -98,8 +98,9 @@ class Obstacle(Load):
     def amiss(self, state: Any, time: float) -> str | None:
         """Whether a boundary that does not touch it is within it."""
         mesh, own = state.mesh, self.boundary.split("|")
+        allowed = PRESSED / self.penalty * cell_size(mesh, self.boundary)
         for name in sorted(set(mesh.GetBoundaries()) - set(own)):
-            found = self._overlap(mesh, name, state.u, time, PRESSED / self.penalty)
+            found = self._overlap(mesh, name, state.u, time, allowed)
             if found is not None:
                 depth, where = found
                 return (
@@ -110,7 +111,7 @@ class Obstacle(Load):
 
     def _check_overlap(self, mesh: Mesh, u: CoefficientFunction, time: float, share: float) -> None:
         """Refuse to start within the obstacle, by more than a share of a cell."""
-        found = self._overlap(mesh, self.boundary, u, time, share)
+        found = self._overlap(mesh, self.boundary, u, time, share * cell_size(mesh, self.boundary))
         if found is not None:
             raise InputError(
                 f"Obstacle on {self.boundary!r}: at the start ({time:g} s) it overlaps the body by {found[0]:.3g} mm "
@@ -118,13 +119,13 @@ class Obstacle(Load):
             )
 
     def _overlap(
-        self, mesh: Mesh, boundary: str, u: CoefficientFunction, time: float, share: float
+        self, mesh: Mesh, boundary: str, u: CoefficientFunction, time: float, allowed: float
     ) -> tuple[float, str] | None:
-        """How far [mm] a boundary is within the obstacle, and where most, if by more than a share of a cell."""
+        """How far [mm] a boundary is within the obstacle, and where most, if by more than is `allowed` [mm]."""
         at = [start + history.at(time) for start, history in zip(self.shape.at, self.schedules, strict=True)]
         gaps = _on(mesh, boundary, self.shape.gap(_seen_from(mesh, at) + u)[0]).ravel()
         worst = int(np.argmin(gaps))
-        if gaps[worst] >= -share * cell_size(mesh, self.boundary):
+        if gaps[worst] >= -allowed:
             return None
         return -gaps[worst], place(_on(mesh, boundary, _seen_from(mesh, (0.0,) * mesh.dim))[worst])
 

@@ -5,14 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from ngsolve import CF, Integrate, specialcf
 
 from ngswell import checks
+from ngswell.baths.bath import area
 from ngswell.baths.treatment import Surroundings
 from ngswell.errors import InputError
-from ngswell.mesh.points import points, vertices, vertices_of
+from ngswell.mesh.points import vertices, vertices_of
 from ngswell.schedules import Schedule, schedule
-from ngswell.setup.supports import Support
+from ngswell.setup.supports import Support, axis_across
 
 LARGEST_PRESSURE = 1e3
 """Forces over the plate's area beyond this [N/mm²] are none that can be meant."""
@@ -60,13 +60,11 @@ class Platen(Support):
         surroundings.check_boundary("Platen", self.boundary)
         self._normal(surroundings)
         if self.force is not None:
-            region, weight = surroundings.mesh.Boundaries(self.boundary), surroundings.kinematics.weight
-            area = Integrate(CF(1.0) * weight, surroundings.mesh, definedon=region)
-            most = max(map(abs, self.history.values))
-            if most > LARGEST_PRESSURE * area:
+            most, on = max(map(abs, self.history.values)), area(surroundings.mesh, surroundings.kinematics, self.boundary)
+            if most > LARGEST_PRESSURE * on:
                 raise InputError(
                     f"Platen on {self.boundary!r}: a force of {most:g} is more than {LARGEST_PRESSURE:g} N/mm² on its area "
-                    f"of {area:g}; units are N and mm"
+                    f"of {on:g}; units are N and mm"
                 )
 
     def fixed(self, surroundings: Surroundings) -> dict[str, str]:
@@ -89,9 +87,8 @@ class Platen(Support):
                     f"Platen on {self.boundary!r}: a cylinder or sphere has no plane side; take a Roller or a Pressure"
                 )
             return kinematics.directions
-        normals = np.abs(specialcf.normal(mesh.dim)(points(mesh, mesh.Boundaries(self.boundary), 2)))
-        axis = int(np.argmax(normals[0]))
-        if normals[:, axis].min() < 1 - 1e-9:
+        axis = axis_across(mesh, self.boundary)
+        if axis is None:
             raise InputError(
                 f"Platen on {self.boundary!r}: it needs a plane side across an axis, this one is curved or oblique"
             )

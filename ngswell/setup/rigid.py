@@ -78,7 +78,7 @@ class RigidSphere(Shape):
     def check(self, kinematics: Kinematics) -> None:
         if kinematics.dimension == 1:
             raise InputError("RigidSphere: a column meets a RigidPlane(at, normal), such as RigidPlane((1.2,), (-1.0,))")
-        if kinematics.dimension == 2 and checks.is_number(kinematics.weight):
+        if kinematics.dimension == kinematics.power == 2:
             raise InputError("RigidSphere: in plane strain take RigidCylinder(at, radius)")
         if kinematics.dimension == 2 and self.at[0] != 0.0:
             raise InputError(f"RigidSphere: axisymmetric it lies on the axis, at (0.0, z), not at r = {self.at[0]:g} mm")
@@ -106,7 +106,7 @@ class RigidCylinder(Shape):
             _check_direction("RigidCylinder: axis", self.axis, self.at)
 
     def check(self, kinematics: Kinematics) -> None:
-        across = kinematics.dimension == 2 and checks.is_number(kinematics.weight)
+        across = kinematics.dimension == kinematics.power == 2
         if kinematics.dimension == 3 and self.axis is None:
             raise InputError("RigidCylinder: in space it needs an axis, such as axis=(0.0, 1.0, 0.0)")
         if across and self.axis is not None:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
-from ngsolve import specialcf
+from ngsolve import Mesh, specialcf
 
 from ngswell import checks
 from ngswell.baths.treatment import Surroundings
@@ -118,11 +118,17 @@ class Symmetry(Support):
         mesh = surroundings.mesh
         if mesh.dim == 1:  # an end has no points
             return surroundings.kinematics.directions
-        normals = np.abs(specialcf.normal(mesh.dim)(points(mesh, mesh.Boundaries(self.boundary), 2)))
-        axis = int(np.argmax(normals[0]))
-        if normals[:, axis].min() < 1 - 1e-9:
+        axis = axis_across(mesh, self.boundary)
+        if axis is None:
             raise InputError(f"Symmetry on {self.boundary!r}: the boundary is not straight along an axis")
         return surroundings.kinematics.directions[axis]
+
+
+def axis_across(mesh: Mesh, boundary: str) -> int | None:
+    """The axis that a boundary in 2-d or 3-d lies across everywhere; None for one that is curved or oblique."""
+    normals = np.abs(specialcf.normal(mesh.dim)(points(mesh, mesh.Boundaries(boundary), 2)))
+    axis = int(np.argmax(normals[0]))
+    return axis if normals[:, axis].min() >= 1 - 1e-9 else None
 
 
 @dataclass(frozen=True)
