@@ -8,6 +8,7 @@ from ngsolve import IfPos, x, y
 from ngswell import (
     TABLE_1,
     TABLE_2,
+    Axisymmetric,
     Bath,
     Concentration,
     Confined,
@@ -17,9 +18,11 @@ from ngswell import (
     Ramp,
     Roller,
     Scene,
+    Spatial,
     Symmetry,
     Traction,
     Weight,
+    box,
     column,
     rectangle,
 )
@@ -101,6 +104,32 @@ def block(**changes) -> Scene:
         }
     )
 
+
+BETWEEN_WALLS = {
+    "confined": (lambda: column(1.0, 2), Confined(), [], "x", 1.0),
+    "plane strain": (lambda: rectangle(1, 1, 2, 2), PlaneStrain(), [Roller("left|right", "x")], "y", 1.0),
+    "axisymmetric": (lambda: rectangle(1, 1, 2, 2), Axisymmetric(), [Roller("left|right", "r")], "z", np.pi),
+    "3-d": (
+        lambda: box(1, 1, 1, 1, 1, 1), Spatial(), [Roller("left|right", "x"), Roller("front|back", "y")], "z", 1.0,
+    ),
+}  # fmt: skip
+"""Bodies of height 1 that stretch along one direction: mesh, motion, walls, that direction, area of the base."""
+
+FREE = {
+    "confined": (lambda: column(1.0, 2), Confined(), [Roller("bottom", "x")], "top"),
+    "plane strain": (lambda: rectangle(1, 1, 2, 2), PlaneStrain(), [Symmetry("left"), Symmetry("bottom")], "top|right"),
+    "axisymmetric": (
+        lambda: rectangle(1, 1, 2, 2), Axisymmetric(), [Roller("left", "r"), Roller("bottom", "z")], "top|right",
+    ),
+    "3-d": (
+        lambda: box(1, 1, 1, 1, 1, 1), Spatial(), [Symmetry("left"), Symmetry("front"), Symmetry("bottom")],
+        "right|back|top",
+    ),
+}  # fmt: skip
+"""Bodies that stretch alike in all directions that the motion leaves free: mesh, motion, supports, free sides."""
+
+CLOSED = {"confined": "confined", "plane strain": "plane strain", "axisymmetric": "3-d", "3-d": "3-d"}
+"""Their closed forms: the motion that `homogeneous_equilibrium` takes."""
 
 SIZES = {
     "u": 0.02,

@@ -16,7 +16,6 @@ from ngswell import (
     TABLE_1,
     TABLE_2,
     Adaptive,
-    Axisymmetric,
     Bath,
     Checkpoint,
     Concentration,
@@ -24,46 +23,25 @@ from ngswell import (
     Fixed,
     InputError,
     Penalty,
-    PlaneStrain,
     Potential,
     Ramp,
     Roller,
     Scene,
-    Spatial,
     Stability,
-    Symmetry,
-    box,
     column,
-    rectangle,
 )
 from ngswell.closed_forms.homogeneous import homogeneous_equilibrium
+from tests.scenes import CLOSED, FREE
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
-MOTIONS = {
-    "confined": (Confined(), lambda: column(1.0, 3), [Roller("bottom", "x")], "top", 1),
-    "plane strain": (PlaneStrain(), lambda: rectangle(1, 1, 2, 2), [Symmetry("left"), Symmetry("bottom")], "top|right", 2),
-    "axisymmetric": (
-        Axisymmetric(),
-        lambda: rectangle(1, 1, 2, 2),
-        [Roller("left", "r"), Roller("bottom", "z")],
-        "top|right",
-        3,
-    ),
-    "3-d": (
-        Spatial(),
-        lambda: box(1, 1, 1, 1, 1, 1),
-        [Symmetry("left"), Symmetry("front"), Symmetry("bottom")],
-        "right|back|top",
-        3,
-    ),
-}  # fmt: skip
+DIRECTIONS = {"confined": 1, "plane strain": 2, "axisymmetric": 3, "3-d": 3}
+"""In which the bodies stretch."""
 CHARGED = Ramp((0, 0.0), (4000, 1.0))  # no faster than salt diffuses in
-CLOSED = {"confined": "confined", "plane strain": "plane strain", "axisymmetric": "3-d", "3-d": "3-d"}
 
 
 def body(motion, material=TABLE_2, salt=0.3, loads=lambda boundary: [], **changes):
-    kinematics, mesh, supports, wet, _ = MOTIONS[motion]
+    mesh, kinematics, supports, wet = FREE[motion]
     return Scene(
         **{
             "mesh": mesh(), "kinematics": kinematics, "material": material, "supports": supports,
@@ -90,12 +68,12 @@ HELD = {"confined": "", "plane strain": "right:x", "axisymmetric": "right:r", "3
 
 def sprung(motion, stiffness, **changes):
     others = [Roller(*pair.split(":")) for pair in HELD[motion].split()]
-    supports = [*MOTIONS[motion][2], *others]
+    supports = [*FREE[motion][2], *others]
     baths, springs = [Bath("top", c=0.3)], [Springs("top", stiffness)]
     return body(motion, supports=supports, baths=baths, loads=lambda wet: springs, **changes)
 
 
-@pytest.mark.parametrize("motion", MOTIONS)
+@pytest.mark.parametrize("motion", FREE)
 def test_springs_come_to_the_closed_form(motion):
     scene = sprung(motion, Ramp((0, STIFFNESS)))
     found = scene.state(scene.equilibrate()).at(middle(scene), "J")  # the top has moved by J − 1 times its height, 1
@@ -139,9 +117,9 @@ def square_balance(free, salt=0.3, m=TABLE_2):
     return high
 
 
-@pytest.mark.parametrize("motion", MOTIONS)
+@pytest.mark.parametrize("motion", FREE)
 def test_a_solid_of_ones_own_comes_to_its_balance(motion):
-    scene, free = body(motion, square_gel), MOTIONS[motion][-1]
+    scene, free = body(motion, square_gel), DIRECTIONS[motion]
     state = scene.state(scene.equilibrate())
     J = square_balance(free)
     assert state.at(middle(scene), "J") == pytest.approx(J, rel=1e-8)

@@ -8,10 +8,8 @@ import pytest
 from ngswell import (
     TABLE_1,
     TABLE_2,
-    Axisymmetric,
     Bath,
     Blend,
-    Confined,
     Fixed,
     InputError,
     Integral,
@@ -24,15 +22,12 @@ from ngswell import (
     Reaction,
     Roller,
     Scene,
-    Spatial,
-    Symmetry,
     Traction,
     Weight,
-    box,
-    column,
     rectangle,
 )
 from ngswell.closed_forms.homogeneous import homogeneous_equilibrium
+from tests.scenes import BETWEEN_WALLS
 
 BALANCED = 1e-10
 """N/mm and the like: what Newton's method leaves (corrections below 1e-8, quadratic) of forces of 0.02 to 0.1."""
@@ -94,28 +89,17 @@ def test_a_pin_counts_with_the_boundary_it_is_on():
     assert at_rest(off, "bottom")[0] == pytest.approx([0.0, 0.0], abs=BALANCED)  # the pin itself bears 0.01
 
 
-MOTIONS = {
-    "confined": (lambda: column(1.0, 2), Confined(), [Roller("bottom", "x")], 1.0, 0.0, "N/mm²"),
-    "plane strain": (
-        lambda: rectangle(1, 1, 2, 2), PlaneStrain(), [Roller("left|right", "x"), Symmetry("bottom")], 1.0, 1.0, "N/mm",
-    ),
-    "axisymmetric": (
-        lambda: rectangle(1, 1, 2, 2), Axisymmetric(), [Roller("left|right", "r"), Symmetry("bottom")], pi, 2 * pi, "N",
-    ),
-    "3-d": (
-        lambda: box(1, 1, 1, 1, 1, 1), Spatial(),
-        [Roller("left|right", "x"), Roller("front|back", "y"), Symmetry("bottom")], 1.0, 1.0, "N",
-    ),
-}  # fmt: skip
+MEASURES = {"confined": (0.0, "N/mm²"), "plane strain": (1.0, "N/mm"), "axisymmetric": (2 * pi, "N"), "3-d": (1.0, "N")}
+"""Of the bodies between walls: the area of the wall at the right, and the unit of forces."""
 
 
-@pytest.mark.parametrize("motion", MOTIONS)
+@pytest.mark.parametrize("motion", BETWEEN_WALLS)
 def test_measures_and_walls(motion):
     """Between walls: the base bears the load on its area, the wall aside the pressure less what the solid bears."""
-    mesh, kinematics, supports, base, side, unit = MOTIONS[motion]
+    (mesh, kinematics, walls, up, base), (side, unit) = BETWEEN_WALLS[motion], MEASURES[motion]
     scene = Scene(
-        mesh=mesh(), kinematics=kinematics, material=TABLE_2, model=LocalDonnan(), supports=supports,
-        baths=[Bath("top", c=0.3)], loads=[Pressure("top", 0.05)],
+        mesh=mesh(), kinematics=kinematics, material=TABLE_2, model=LocalDonnan(),
+        supports=[*walls, Roller("bottom", up)], baths=[Bath("top", c=0.3)], loads=[Pressure("top", 0.05)],
     )  # fmt: skip
     found = {name: Reaction(name) for name in (["bottom", "right"] if side else ["bottom"])}
     scene.equilibrate(observers=list(found.values()), unstable="off")
@@ -136,12 +120,12 @@ def test_what_a_bath_bears():
     assert baths == pytest.approx([0.0, 0.01], abs=1e-14)  # P times the way between the ends of the clamped base, turned
 
 
-@pytest.mark.parametrize("motion", MOTIONS)
+@pytest.mark.parametrize("motion", BETWEEN_WALLS)
 def test_what_a_bath_bears_in_its_measure(motion):
-    mesh, kinematics, supports, base, _, _ = MOTIONS[motion]
+    mesh, kinematics, walls, up, base = BETWEEN_WALLS[motion]
     scene = Scene(
-        mesh=mesh(), kinematics=kinematics, material=TABLE_2, model=LocalDonnan(), supports=supports,
-        baths=[Bath("top", c=0.3, P=0.05)],
+        mesh=mesh(), kinematics=kinematics, material=TABLE_2, model=LocalDonnan(),
+        supports=[*walls, Roller("bottom", up)], baths=[Bath("top", c=0.3, P=0.05)],
     )  # fmt: skip
     assert at_rest(scene, "top")[0][-1] == pytest.approx(0.05 * base, rel=1e-12)
 

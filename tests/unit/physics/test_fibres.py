@@ -12,7 +12,6 @@ from ngswell import (
     Adaptive,
     Axisymmetric,
     Bath,
-    Confined,
     Cylindrical,
     FibreDistribution,
     FibreReinforced,
@@ -25,14 +24,10 @@ from ngswell import (
     Ramp,
     Roller,
     Scene,
-    Spatial,
     StepError,
-    Symmetry,
     Traction,
     Uncharged,
-    box,
     by_region,
-    column,
     ray,
     rectangle,
 )
@@ -41,6 +36,7 @@ from ngswell.closed_forms.homogeneous import homogeneous_equilibrium
 from ngswell.physics.fibres import hemisphere
 from ngswell.physics.solid import small_strain_moduli
 from ngswell.run.digest import setup_digest
+from tests.scenes import FREE
 from tests.unit.physics.test_elastic import F, energy, nominal
 
 OBLIQUE = (1.0, 2.0, -0.5)
@@ -192,27 +188,11 @@ def test_closed_forms_refuse_what_has_a_direction_or_a_kink():
 
 # -- bodies ------------------------------------------------------------------------------------------------------------
 
-MOTIONS = {
-    "confined": (Confined(), lambda: column(1.0, 2), [Roller("bottom", "x")], "top"),
-    "plane strain": (PlaneStrain(), lambda: rectangle(1, 1, 2, 2), [Symmetry("left"), Symmetry("bottom")], "top|right"),
-    "axisymmetric": (
-        Axisymmetric(),
-        lambda: rectangle(1, 1, 2, 2),
-        [Roller("left", "r"), Roller("bottom", "z")],
-        "top|right",
-    ),
-    "cylindrical": (Cylindrical(), lambda: ray(0.0, 1.0, 2), [Roller("inner", "r")], "outer"),
-    "3-d": (
-        Spatial(),
-        lambda: box(1, 1, 1, 1, 1, 1),
-        [Symmetry("left"), Symmetry("front"), Symmetry("bottom")],
-        "right|back|top",
-    ),
-}  # fmt: skip
+MOTIONS = {**FREE, "cylindrical": (lambda: ray(0.0, 1.0, 2), Cylindrical(), [Roller("inner", "r")], "outer")}
 
 
 def body(motion, *families, salt=0.3, material=None, **changes):
-    kinematics, mesh, supports, wet = MOTIONS[motion]
+    mesh, kinematics, supports, wet = MOTIONS[motion]
     return Scene(
         **{
             "mesh": mesh(), "kinematics": kinematics, "material": material or reinforced(*families), "supports": supports,

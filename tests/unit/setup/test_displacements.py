@@ -30,16 +30,15 @@ from ngswell import (
     Roller,
     Scene,
     Sine,
-    Spatial,
     Spline,
     Stability,
     Symmetry,
     Traction,
-    box,
     column,
     rectangle,
 )
 from ngswell.closed_forms.homogeneous import homogeneous_equilibrium
+from tests.scenes import BETWEEN_WALLS
 
 DOWN = Ramp((0, 0.0), (100, -0.1))
 
@@ -109,20 +108,11 @@ def test_what_agrees_is_taken():
 
 # -- where it is, in every motion ----------------------------------------------------------------------------------------
 
-MOTIONS = {
-    "confined": (lambda: column(1.0, 2), Confined(), [], "x", 1.0),
-    "plane strain": (lambda: rectangle(1, 1, 2, 2), PlaneStrain(), [Roller("left|right", "x")], "y", 1.0),
-    "axisymmetric": (lambda: rectangle(1, 1, 2, 2), Axisymmetric(), [Roller("left|right", "r")], "z", np.pi),
-    "3-d": (
-        lambda: box(1, 1, 1, 1, 1, 1), Spatial(), [Roller("left|right", "x"), Roller("front|back", "y")], "z", 1.0,
-    ),
-}  # fmt: skip
 
-
-@pytest.mark.parametrize("motion", MOTIONS)
+@pytest.mark.parametrize("motion", BETWEEN_WALLS)
 def test_a_held_height_bears_the_load_that_gives_it(motion):
     """Between walls, in equilibrium with 0.3 mol/l: the swelling pressure at J is the load under which J is at rest."""
-    mesh, kinematics, walls, up, area = MOTIONS[motion]
+    mesh, kinematics, walls, up, area = BETWEEN_WALLS[motion]
     load = 0.05
     rest = homogeneous_equilibrium(TABLE_2, 0.3, "confined", load=load)
     scene = Scene(

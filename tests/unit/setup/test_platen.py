@@ -11,7 +11,6 @@ from ngswell import (
     TABLE_1,
     TABLE_2,
     Adaptive,
-    Axisymmetric,
     Bath,
     Blend,
     Checkpoint,
@@ -33,14 +32,12 @@ from ngswell import (
     Reaction,
     Roller,
     Scene,
-    Spatial,
     Spherical,
     StepError,
     Symmetry,
     Traction,
     TwoLevelSolver,
     Uncharged,
-    box,
     column,
     rectangle,
 )
@@ -48,6 +45,7 @@ from ngswell.analysis.perturbations import Perturbations
 from ngswell.closed_forms.homogeneous import homogeneous_equilibrium
 from ngswell.problem.problem import Problem
 from studies.limits.verification import quarter_disc
+from tests.scenes import BETWEEN_WALLS
 
 BALANCED = 1e-10
 """What Newton's method leaves of forces of 0.02 to 0.1."""
@@ -124,26 +122,17 @@ def test_a_platen_keeps_a_body_from_turning():
 
 # -- in every motion -----------------------------------------------------------------------------------------------------
 
-MOTIONS = {
-    "confined": (lambda: column(1.0, 2), Confined(), [Roller("bottom", "x")], 1.0),
-    "plane strain": (lambda: rectangle(1, 1, 2, 2), PlaneStrain(), [Roller("left|right", "x"), Symmetry("bottom")], 1.0),
-    "axisymmetric": (lambda: rectangle(1, 1, 2, 2), Axisymmetric(), [Roller("left|right", "r"), Symmetry("bottom")], np.pi),
-    "3-d": (
-        lambda: box(1, 1, 1, 1, 1, 1), Spatial(),
-        [Roller("left|right", "x"), Roller("front|back", "y"), Symmetry("bottom")], 1.0,
-    ),
-}  # fmt: skip
 
-
-@pytest.mark.parametrize("motion", MOTIONS)
+@pytest.mark.parametrize("motion", BETWEEN_WALLS)
 @pytest.mark.parametrize("porous", [True, False])
 def test_the_height_under_a_force(motion, porous):
     """Between walls, a porous platen with the bath behind: J of the closed form, the bath's pressure on it or not."""
-    mesh, kinematics, walls, area = MOTIONS[motion]
+    mesh, kinematics, walls, up, area = BETWEEN_WALLS[motion]
     P = 0.01
     scene = Scene(
         mesh=mesh(), kinematics=kinematics, material=TABLE_2, model=LocalDonnan(),
-        baths=[Bath("top", c=0.3, P=P, porous_plate=porous)], supports=[*walls, Platen("top", force=-0.05 * area)],
+        baths=[Bath("top", c=0.3, P=P, porous_plate=porous)],
+        supports=[*walls, Roller("bottom", up), Platen("top", force=-0.05 * area)],
     )  # fmt: skip
     top, base = Reaction("top"), Reaction("bottom")
     state = scene.state(scene.equilibrate(observers=[top, base], unstable="off"))
