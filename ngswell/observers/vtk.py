@@ -6,7 +6,6 @@ import re
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from xml.sax.saxutils import quoteattr
 
 import numpy as np
 from ngsolve import CF, CoefficientFunction, VTKOutput, x, y, z
@@ -135,6 +134,8 @@ class VTK(Observer):
             warn_of_extrapolation("VTK", contents[worst], position.ravel())
 
     def _write_series(self) -> None:
+        from xml.sax.saxutils import quoteattr  # not above: it imports urllib, http and ssl
+
         entries = [
             f'<DataSet timestep="{time!r}" file={quoteattr(self._piece(number).name)}/>'
             for number, time in enumerate(self._recorded)
