@@ -4,27 +4,64 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import cache
+from typing import Protocol
 
 import numpy as np
 from netgen.meshing import NgException
-from ngsolve import H1, BaseMatrix, BaseVector, BilinearForm, BitArray, dx
-from ngsolve.meshes import Make1DMesh
+from ngsolve import BaseMatrix, BaseVector, BilinearForm, BitArray
 from numpy.typing import NDArray
 
 from ngswell.problem.discretisation import Tie
 from ngswell.problem.problem import Problem
+from ngswell.solve.pardiso import Pardiso, library
 
 
 @cache
 def best_solver() -> str:
     """Name of the solver: pardiso where MKL is installed (`pip install ngswell[mkl]`), else umfpack."""
-    space = H1(Make1DMesh(1), order=1)
-    u, v = space.TnT()
-    try:
-        BilinearForm(u * v * dx).Assemble().mat.Inverse(space.FreeDofs(), inverse="pardiso")
-    except (NgException, RuntimeError):
-        return "umfpack"
-    return "pardiso"
+    return "umfpack" if library() is None else "pardiso"
+
+
+class Factors(Protocol):
+    """Factors of a matrix on its free degrees of freedom."""
+
+    anew: bool
+    """Whether the last factorisation has an analysis of its own, which later ones share."""
+
+    def update(self) -> bool:
+        """Factorise the matrix as it is now; False where it is singular or holds a value that is not finite."""
+
+    def solve(self, right: BaseVector, solution: BaseVector) -> bool:
+        """solution = A⁻¹ right on the free degrees of freedom, 0 elsewhere; False where none is found."""
+
+
+class NGSolveFactors:
+    """Factors by one of the solvers that NGSolve brings."""
+
+    def __init__(self, matrix: BaseMatrix, free: BitArray, name: str) -> None:
+        self._matrix, self._free, self._name = matrix, free, name
+        self._inverse: BaseMatrix | None = None
+        self.anew = False
+
+    def update(self) -> bool:
+        """See `Factors`."""
+        if not np.isfinite(self._matrix.AsVector().FV().NumPy()).all():
+            return False
+        self.anew = self._inverse is None
+        try:
+            if self._inverse is None:
+                self._inverse = self._matrix.Inverse(self._free, inverse=self._name)
+            else:
+                self._inverse.Update()
+        except NgException:
+            self._inverse = None
+            return False
+        return True
+
+    def solve(self, right: BaseVector, solution: BaseVector) -> bool:
+        """See `Factors`."""
+        solution.data = self._inverse * right
+        return True
 
 
 class LinearSolver:
@@ -45,24 +82,26 @@ class LinearSolver:
         self.name = name or best_solver()
         self._free = free
         self._matrix: BaseMatrix | None = None
-        self._inverse: BaseMatrix | None = None
+        self._factors: Factors | None = None
         self._ties: Ties | None = None
         self.factorisations = self.solves = 0
 
     def factorise(self, matrix: BaseMatrix) -> bool:
         """Factorise `matrix`; False if it is singular or holds a value that is not finite."""
-        if not np.isfinite(matrix.AsVector().FV().NumPy()).all():
-            return False
-        try:
-            if self._inverse is None or matrix is not self._matrix:
-                self._inverse, self._matrix = matrix.Inverse(self._free, inverse=self.name), matrix
-            else:
-                self._inverse.Update()
-        except NgException:
-            self._inverse = None
+        if self._factors is None or matrix is not self._matrix:
+            mine = self.name == "pardiso"
+            self._matrix = matrix
+            self._factors = Pardiso(matrix, self._free) if mine else NGSolveFactors(matrix, self._free, self.name)
+        if not self._factors.update():
+            self._factors = None
             return False
         self.factorisations += 1
         return True
+
+    @property
+    def analysed_anew(self) -> bool:
+        """Whether the last factorisation has an analysis of its own, which later ones share."""
+        return self._factors is not None and self._factors.anew
 
     def linearise(self, problem: Problem) -> BaseMatrix:
         """The matrix to factorise, at the present fields."""
@@ -99,10 +138,9 @@ class LinearSolver:
 
     def invert(self, right: BaseVector, solution: BaseVector) -> bool:
         """A⁻¹ on the free degrees of freedom, zero elsewhere; not in place."""
-        if self._inverse is None:
+        if self._factors is None:
             raise RuntimeError("factorise before solving")
-        solution.data = self._inverse * right
-        return True
+        return self._factors.solve(right, solution)
 
 
 class Ties:

@@ -37,7 +37,7 @@ class Factorisation:
         self._ready = False
         self._contraction: float | None = None  # the last correction over the one before, once there are two
         self._made: Point | None = None
-        self._analysed: Point | None = None  # the first one: the analysis, which all share, depends on its values
+        self._analysed: Point | None = None  # of the analysis that later ones share, which may depend on its values
 
     @property
     def usable(self) -> bool:
@@ -74,7 +74,8 @@ class Factorisation:
         if not self.solver.renew(problem):
             return False
         self._ready, self._made = True, at
-        self._analysed = self._analysed or at
+        if self._analysed is None or self.solver.analysed_anew:
+            self._analysed = at
         return True
 
     def solve(self, right: BaseVector, solution: BaseVector, prescribed: BaseVector | None = None) -> bool:
