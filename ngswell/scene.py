@@ -23,6 +23,7 @@ from ngswell.run.equilibrium import equilibrate
 from ngswell.run.restart import Restart
 from ngswell.run.result import Result
 from ngswell.run.run import run
+from ngswell.run.threads import threads_said
 from ngswell.schedules import Ramp
 from ngswell.setup.limits import limits
 from ngswell.setup.loads import Load
@@ -123,6 +124,7 @@ class Scene(Setup):
             how = "displaced" if one.force is None else "displaced as one by a force"
             lines.append(f"  {type(one.support).__name__} on {one.boundary}: {how} along {one.direction}")
         lines += [f"  {name}: {law}" for name, law in self.material.laws().items()]
+        lines.append(f"  threads: {threads_said(problem)}")
         lines += [f"  limit: {limit}" for limit in limits(self)]
         return "\n".join(lines)
 

@@ -8,7 +8,6 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-from ngsolve import TaskManager
 from threadpoolctl import threadpool_limits
 
 from ngswell import checks
@@ -26,6 +25,7 @@ from ngswell.run.restart import Restart, versions
 from ngswell.run.result import Result
 from ngswell.run.signals import Signals, Stopped
 from ngswell.run.start import Start
+from ngswell.run.threads import threads_for
 from ngswell.run.watch import Watch
 from ngswell.setup.setup import Setup
 from ngswell.setup.snapshot import Snapshot
@@ -72,7 +72,7 @@ def _run(
     method.check_first_step(start.begin, start.until)
     timetable, problem = start.timetable(setup, watch, checkpoint), Problem(setup)
     start.apply(problem)
-    with TaskManager(), threadpool_limits(1, user_api="blas"), Signals(checkpoint is not None) as signals, watch:
+    with threads_for(problem), threadpool_limits(1, user_api="blas"), Signals(checkpoint is not None) as signals, watch:
         watch.start(problem, start.begin, start.time, start.until, start.remembered)
         steps.begin(*start.logged)
         stepper = method.stepper(problem, timetable, start.restart)
