@@ -36,8 +36,9 @@ def main(arguments: list[str] | None = None) -> int:
     studies = {name: importlib.import_module(module) for name, module in STUDIES.items()}
     own = {name: own_options(study) for name, study in studies.items()}
     parser = argparse.ArgumentParser(
-        prog="python -m studies", description="Draw figures, with their numbers.", parents=list(own.values())
-    )
+        prog="python -m studies", description="Draw figures, with their numbers.", parents=list(own.values()),
+        conflict_handler="resolve",  # studies may share an option
+    )  # fmt: skip
     parser.add_argument("name", nargs="?", choices=STUDIES, help="one study; the paper's three if none is named")
     parser.add_argument("--quick", action="store_true", help="coarser and shorter, within about a minute")
     parser.add_argument("--out", type=Path, help="folder to write to; figures/ by default, figures/quick/ with --quick")
@@ -48,8 +49,9 @@ def main(arguments: list[str] | None = None) -> int:
         defaults = vars(of_study.parse_args([]))
         special[name] = {option: getattr(options, option) for option in defaults}
         for option, value in special[name].items():
-            if value != defaults[option] and options.name != name:
-                parser.error(f"--{option.replace('_', '-')} goes with {name}")
+            owners = [study for study, other in own.items() if option in vars(other.parse_args([]))]
+            if value != defaults[option] and options.name not in owners:
+                parser.error(f"--{option.replace('_', '-')} goes with {' and '.join(owners)}")
 
     names = PAPER if options.name is None else (options.name,)
     folder = options.out or Path("figures/quick" if options.quick else "figures")

@@ -1,21 +1,29 @@
-"""Error against time: the free-swelling block by a plain NGSolve script, by the paper's way, and by our choices.
+"""Error against time: the free-swelling block by good scripts, by a plain one, by the paper's way and by ours.
 
-Errors are against a reference, whose own error is estimated by a second one with another order, mesh and tolerance. Area:
-largest error over all steps from 0 to 11000 s, relative to the area at 7000 s. Pressure: root mean square over the block at
-the worst of the pictured times, relative to that of the pressure. Seconds are those of the time loop, medians of runs that
-take turns. For each curve NAME of the figure:
+Errors are against a reference, whose own error a second one with another order, mesh and tolerance tells. Area: largest
+error over all steps from 0 to 11000 s, relative to the area at 7000 s. Pressure: root mean square over the block at the
+worst of the pictured times, relative to that of the pressure. Seconds are CPU seconds of the time loop on one
+thread (the plain script's are the clock's), medians of runs that take turns. For each curve NAME of the figure:
 
 - `NAME_seconds_at_1e-2`, `..._1e-3`, `..._1e-4` [s] for that error of the area, on the line through the points that no
   other point of the curve beats in both error and time; `NAME_at_1e-2` and so on: "measured" (between points),
   "extrapolated" (beyond the most accurate, with the slope of all), "at most" (the cheapest point is already more accurate);
 - `NAME_setup_seconds` [s]: mesh, spaces, forms and their compilation, observers, for the dearest point of the curve;
-- `ratio_to_plain_at_1e-2`, `..._1e-3`: seconds of the plain script over those of the best of our curves, `best_at_...`;
+- `best_at_1e-2` and so on: the fastest of our curves (without the paper's way), `best_rival_at_...` the fastest of the
+  others; an extrapolated time counts only where none is measured. `ratio_to_best_rival_at_...`: seconds of the latter over
+  those of the former, above 1 where ours is faster; `ratio_at_..._is`: "measured" if both are, else what they are;
+  `best_rival`: the one at 1e-3;
+- `pressure_...`: the same of the error of the pressure; `ratio_to_plain_at_1e-2`, `..._1e-3`: plain script's over ours;
 - `reference_area_error`, `reference_pressure_error`: what the two references differ by;
-- `threads`: NGS_NUM_THREADS, for the plain script as well;
+- `threads`: NGS_NUM_THREADS, `machine`: processor and cores;
 - `penalty_40_area_error`: what the paper's penalty itself changes, on one mesh with one tolerance.
 
-The plain script is no part of the project: `--plain PATH` names it, or it lies in ../shared/peers beside the checkout; else
-`plain` says that it is absent, and the ratios are left out. `plain_failed`: meshes and steps with which it gave up.
+Rivals (`studies/rivals`, without ngswell): `good_ngsolve_SCHEME_MESH` and `dolfinx_SCHEME_MESH`, SCHEME `euler` or `esdirk4`
+(both with control of the error and kept factorisations), MESH `uniform` (order 2) or `graded` (order 3). `--dolfinx PYTHON`
+names a python that has DOLFINx; on Debian 12 /usr/bin/python3 after `apt-get install python3-dolfinx libopenblas0-pthread`.
+Else `dolfinx` says that it is absent. The plain script is no part of the project: `--plain PATH` names it, or it lies in
+../shared/peers beside the checkout; else `plain` says that it is absent, and its ratios are left out. `NAME_failed`: meshes
+and steps with which a rival gave up.
 """
 
 from __future__ import annotations
@@ -25,11 +33,12 @@ import json
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from time import perf_counter
+from time import process_time
 from typing import Any
 
 import matplotlib.pyplot as plt
@@ -54,19 +63,16 @@ from ngswell import (
 from ngswell.models.model import Model
 from ngswell.stepping.attempts import polynomial_at
 from studies.output import Findings, cost, letter_panels
-from studies.paper.free_swelling import PICTURES as ALL_PICTURES
+from studies.rivals.block import KINKS, PICTURES, SAMPLES
+from studies.rivals.worker import ABSENT, Worker, add_dolfinx, machine, usable
 from studies.scenes import BLENDED, END, HEIGHT, INITIAL, WIDTH, free_swelling_block, with_model
 
-PICTURES = ALL_PICTURES[1:]
 SCRIPT = Path(__file__).resolve().parents[3] / "shared" / "peers" / "plain_ngsolve.py"
 BENDS = {"x": BLENDED, "y": BLENDED}
 """Where the blended baths bend [mm]."""
 
 WANTED = (1e-2, 1e-3, 1e-4)
-SAMPLES = np.stack(
-    np.meshgrid(WIDTH * (np.arange(24) + 0.497) / 24, HEIGHT * (np.arange(24) + 0.497) / 24), axis=-1
-).reshape(-1, 2)
-"""Where pressures are compared [mm]; off the lines of all meshes used."""
+COUNTS = ("steps", "newton", "factorisations", "solves")
 
 
 @dataclass(frozen=True)
@@ -97,18 +103,21 @@ class ComputedBlock:
     seconds: list[float]
     setup: float = 0.0
     result: Result | None = None
+    counts: dict[str, int] | None = None  # COUNTS
 
 
 def compute_ours(run: Way, label: str) -> ComputedBlock:
     """One of our own runs; what is not its time loop is setup."""
-    clock = perf_counter()
+    clock = process_time()
     scene = run.scene()
+    assert scene.problem.space.ndof
     area, pictures = Area(), Snapshots(PICTURES)
+    setup, clock = process_time() - clock, process_time()
     result = scene.run(END, run.steps, [area, pictures, Progress(f"speed_error {label}")])
-    setup = perf_counter() - clock - result.seconds
+    seconds = process_time() - clock
     samples = scene.mesh(*SAMPLES.T)
     pressures = np.array([scene.state(picture).output("p")(samples).ravel() for picture in pictures.states])
-    return ComputedBlock(area.time, area.values, pressures, result.end.values.size, [result.seconds], setup, result)
+    return ComputedBlock(area.time, area.values, pressures, result.end.values.size, [seconds], setup, result)
 
 
 def compute_plain(script: Path, cells: tuple[int, int], step: float) -> ComputedBlock | None:
@@ -124,12 +133,22 @@ def compute_plain(script: Path, cells: tuple[int, int], step: float) -> Computed
     return ComputedBlock(history[:, 0], history[:, 1], None, found["ndof"], [found["seconds"]])
 
 
+def compute_rival(worker: Worker, scheme: str, tolerance: float) -> ComputedBlock | None:
+    """A good script's run; None if it gives up."""
+    found = worker.ask(scheme, tolerance)
+    if found is None:
+        return None
+    counts = {name: found[name] for name in COUNTS}
+    time, area, pressures = (np.array(found[name]) for name in ("time", "area", "pressures"))
+    return ComputedBlock(time, area, pressures, found["unknowns"], [found["seconds"]], worker.setup or 0.0, counts=counts)
+
+
 @dataclass
 class Reference:
     """What is taken as exact: area over time between the kinks of the baths, and pressures."""
 
     course: ComputedBlock
-    kinks: Sequence[float] = (0.0, 4000.0, 7000.0, 7080.0, 7220.0, 8000.0, 10000.0, END)
+    kinks: Sequence[float] = KINKS
 
     def area(self, time: NDArray) -> NDArray:
         """Cubic through the four nearest steps, none beyond a kink."""
@@ -163,6 +182,11 @@ class Curve:
     settings: list[tuple[str, float]]
     courses: list[ComputedBlock] = field(default_factory=list)
     failed: list[str] = field(default_factory=list)
+
+    @property
+    def rival(self) -> bool:
+        """Whether it is computed without ngswell."""
+        return self.name.startswith(("plain", "good_ngsolve", "dolfinx"))
 
     def take_turn(self) -> None:
         """Run every point once; the second time only the seconds are new. Points that fail are dropped, and said."""
@@ -250,9 +274,52 @@ def plain_curve(script: Path, quick: bool) -> Curve:
     return Curve("plain", "plain NGSolve script", makers, settings)
 
 
+@contextmanager
+def rival_curves(quick: bool, dolfinx: str | None) -> Iterator[list[Curve]]:
+    """Good scripts: all are built, at the same time, before any runs; their processes end with the context."""
+    engines = {"good_ngsolve": ("good NGSolve script", sys.executable, "studies.rivals.good_ngsolve")}
+    if dolfinx:
+        engines["dolfinx"] = ("DOLFINx", dolfinx, "studies.rivals.dolfinx_block")
+    cases: dict[tuple[str, str], list[tuple[int, float]]] = {
+        ("euler", "uniform"): [(11, 1e-2), (11, 3e-3), (22, 1e-3), (44, 2e-4)],
+        ("esdirk4", "uniform"): [(11, 1e-2), (22, 1e-3), (44, 1e-3)],
+        ("euler", "graded"): [(4, 3e-3), (6, 3e-4), (8, 3e-5)],
+        ("esdirk4", "graded"): [(3, 1e-2), (4, 1e-2), (4, 1e-3), (6, 1e-3), (6, 1e-4), (8, 1e-4), (12, 1e-5)],
+    }
+    if quick:
+        cases = {("euler", "uniform"): [(6, 1e-2)], ("esdirk4", "graded"): [(3, 1e-2), (4, 1e-2)]}
+    workers: dict[tuple[str, str, int], Worker] = {}
+    curves = []
+    try:
+        for engine, (label, python, module) in engines.items():
+            for (scheme, mesh), points in cases.items():
+                makers: list[Callable[[], ComputedBlock | None]] = []
+                for cells, tolerance in points:
+                    shape = (cells, cells, 6.0, 3) if mesh == "graded" else (cells, cells * 10 // 11, 1.0, 2)
+                    options = [part for pair in zip(GRID, shape, strict=True) for part in pair]
+                    key = (engine, mesh, cells)
+                    if key not in workers:
+                        workers[key] = Worker(python, module, options + ["--bytecode"] * quick)
+                    makers.append(partial(compute_rival, workers[key], scheme, tolerance))
+                settings = [(f"{cells} x {cells if mesh == 'graded' else cells * 10 // 11}", at) for cells, at in points]
+                name = f"{engine}_{scheme}_{mesh}"
+                curves.append(Curve(name, f"{label}, {LABELS[scheme]}, {mesh}", makers, settings))
+        for worker in workers.values():
+            worker.ready()
+        yield curves
+    finally:
+        for worker in workers.values():
+            worker.close()
+
+
+GRID = ("--nx", "--ny", "--grade", "--order")
+LABELS = {"euler": "backward Euler", "esdirk4": "ESDIRK4"}
+
+
 def options(parser: argparse.ArgumentParser) -> None:
-    """`--plain PATH`."""
+    """`--plain PATH`; `--dolfinx PYTHON`, which `iteration` has as well."""
     parser.add_argument("--plain", type=existing, help="speed_error: the plain NGSolve script to compare with")
+    add_dolfinx(parser)
 
 
 def existing(path: str) -> Path:
@@ -277,28 +344,31 @@ class Comparison:
         return next((curve for curve in self.curves if curve.name == "plain"), None)
 
 
-def run(quick: bool = False, plain: Path | None = None) -> Findings:
+def run(quick: bool = False, plain: Path | None = None, dolfinx: str | None = None) -> Findings:
     """All curves, their points three times in turns, and what they say."""
     script, turns = SCRIPT if plain is None else plain, 1 if quick else 3
-    comparison = compute(quick, script if script.is_file() else None, turns)
+    there = usable(dolfinx)
+    with rival_curves(quick, dolfinx if there else None) as rivals:
+        comparison = compute(quick, script if script.is_file() else None, rivals, turns)
     found = numbers(comparison)
     found["plain"] = "run" if comparison.plain else f"absent: no {script.name}; name it with --plain"
+    found["dolfinx"] = there or ABSENT
     results = [course.result for curve in comparison.curves for course in curve.courses if course.result]
-    found |= {"mesh": "see the CSV", "turns": turns, "threads": ngsglobals.numthreads, **cost(results)}
+    found |= {"mesh": "see the CSV", "turns": turns, "threads": ngsglobals.numthreads, "machine": machine(), **cost(results)}
     header = ("curve", "mesh", "tolerance_or_step", "unknowns", "seconds", "seconds_min", "seconds_max", "setup_seconds",
               "area_error", "pressure_error", "steps", "newton_iterations", "factorisations", "solves")  # fmt: skip
     rows = [row for curve in comparison.curves for row in table(curve, comparison.reference)]
     return Findings(draw(comparison), header, rows, found)
 
 
-def compute(quick: bool, script: Path | None, turns: int) -> Comparison:
+def compute(quick: bool, script: Path | None, rivals: list[Curve], turns: int) -> Comparison:
     """The references, the penalty's own error, and all curves in turns."""
     best = Way(Potential(3), 8, 6.0, Adaptive(1e-4)) if quick else Way(Potential(4), 10, 8.0, Adaptive(1e-5))
     other = Way(Potential(3), 6, 6.0, Adaptive(3e-4)) if quick else Way(Potential(3), 14, 10.0, Adaptive(2e-5))
     reference, second = Reference(compute_ours(best, "reference")), compute_ours(other, "second reference")
     cells, steps = (4, Adaptive(1e-3)) if quick else (8, Adaptive(1e-5))
     exact, weak = (compute_ours(Way(Concentration(3), cells, 6.0, steps, penalty), "penalty") for penalty in (None, 40.0))
-    curves = [*our_curves(quick), paper_curve(quick)]
+    curves = [*rivals, *our_curves(quick), paper_curve(quick)]
     if script:
         curves.insert(0, plain_curve(script, quick))
     for _ in range(turns):
@@ -308,29 +378,57 @@ def compute(quick: bool, script: Path | None, turns: int) -> Comparison:
 
 
 def numbers(comparison: Comparison) -> dict[str, float | int | str]:
-    """Seconds for each wanted error, and how much less than the plain script that is."""
+    """Seconds for each wanted error, and how they compare."""
     reference = comparison.reference
     found: dict[str, float | int | str] = {
         "reference_area_error": reference.area_error(comparison.second),
         "reference_pressure_error": reference.pressure_error(comparison.second),
         "penalty_40_area_error": comparison.penalty_error,
     }
-    if comparison.plain:
-        found["plain_failed"] = "; ".join(comparison.plain.failed) or "none"
-    at: dict[str, dict[float, float]] = {}
+    area: dict[str, dict[float, tuple[float, str]]] = {}
+    pressure: dict[str, dict[float, tuple[float, str]]] = {}
     for curve in comparison.curves:
-        at[curve.name] = {}
-        for wanted in WANTED:
-            at[curve.name][wanted], how = seconds_at(wanted, curve.area_errors(reference), curve.seconds)
-            found[f"{curve.name}_seconds_at_{_power(wanted)}"] = at[curve.name][wanted]
+        if curve.rival:
+            found[f"{curve.name}_failed"] = "; ".join(curve.failed) or "none"
+        if not curve.courses:
+            continue
+        area[curve.name] = {at: seconds_at(at, curve.area_errors(reference), curve.seconds) for at in WANTED}
+        for wanted, (seconds, how) in area[curve.name].items():
+            found[f"{curve.name}_seconds_at_{_power(wanted)}"] = seconds
             found[f"{curve.name}_at_{_power(wanted)}"] = how
         found[f"{curve.name}_setup_seconds"] = max(course.setup for course in curve.courses)
-    ours = [curve.name for curve in comparison.curves if curve.name not in ("plain", "paper")]
-    for wanted in WANTED[:2] if "plain" in at else ():
-        fastest = min(ours, key=lambda name: at[name][wanted])
-        found[f"best_at_{_power(wanted)}"] = fastest
-        found[f"ratio_to_plain_at_{_power(wanted)}"] = at["plain"][wanted] / at[fastest][wanted]
+        errors = curve.pressure_errors(reference)
+        if errors is not None:
+            pressure[curve.name] = {at: seconds_at(at, errors, curve.seconds) for at in WANTED}
+    rivals = [curve.name for curve in comparison.curves if curve.rival]
+    for wanted in WANTED:
+        found |= ratio(wanted, area, rivals, "") | ratio(wanted, pressure, rivals, "pressure_")
+        if "plain" in area and wanted > WANTED[-1]:
+            best = found[f"best_at_{_power(wanted)}"]
+            found[f"ratio_to_plain_at_{_power(wanted)}"] = area["plain"][wanted][0] / area[str(best)][wanted][0]
+    found["best_rival"] = found[f"best_rival_at_{_power(WANTED[1])}"]
     return found
+
+
+def ratio(
+    wanted: float, at: dict[str, dict[float, tuple[float, str]]], rivals: Sequence[str], prefix: str
+) -> dict[str, float | int | str]:
+    """The fastest rival's seconds over those of the fastest of ours, and which and how they were found."""
+
+    def order(name: str) -> tuple[bool, float]:
+        seconds, how = at[name][wanted]
+        return how == "extrapolated", seconds
+
+    ours = min((name for name in at if name not in rivals and name != "paper"), key=order)
+    theirs = min((name for name in at if name in rivals), key=order)
+    (mine, how), (their, how_theirs) = at[ours][wanted], at[theirs][wanted]
+    power = _power(wanted)
+    return {
+        f"{prefix}best_at_{power}": ours,
+        f"{prefix}best_rival_at_{power}": theirs,
+        f"{prefix}ratio_to_best_rival_at_{power}": their / mine,
+        f"{prefix}ratio_at_{power}_is": "measured" if how == how_theirs == "measured" else f"rival {how_theirs}, ours {how}",
+    }
 
 
 def table(curve: Curve, reference: Reference) -> list[tuple[object, ...]]:
@@ -341,7 +439,9 @@ def table(curve: Curve, reference: Reference) -> list[tuple[object, ...]]:
     points = zip(curve.settings, curve.courses, curve.seconds, areas, pressures, strict=True)
     for (mesh, accuracy), course, seconds, area, pressure in points:
         done = course.result
-        effort = (len(done.steps), done.iterations, done.factorisations, done.solves) if done else ("", "", "", "")
+        effort: tuple[object, ...] = tuple(course.counts.values()) if course.counts else ("",) * len(COUNTS)
+        if done:
+            effort = (len(done.steps), done.iterations, done.factorisations, done.solves)
         spread = (min(course.seconds), max(course.seconds))
         rows.append((curve.name, mesh, accuracy, course.unknowns, seconds, *spread, course.setup, area, pressure, *effort))
     return rows
@@ -354,6 +454,14 @@ def _power(wanted: float) -> str:
 STYLES: dict[str, dict[str, Any]] = {
     "plain": {"color": "k", "ls": "--", "marker": "P", "mfc": "w"},
     "paper": {"color": "k", "ls": ":", "marker": "x"},
+    "good_ngsolve_euler_uniform": {"color": "tab:blue", "ls": ":", "marker": "s", "mfc": "w"},
+    "good_ngsolve_esdirk4_uniform": {"color": "tab:blue", "ls": "-", "marker": "s", "mfc": "w"},
+    "good_ngsolve_euler_graded": {"color": "tab:blue", "ls": ":", "marker": "o"},
+    "good_ngsolve_esdirk4_graded": {"color": "tab:blue", "ls": "-", "marker": "o"},
+    "dolfinx_euler_uniform": {"color": "tab:red", "ls": ":", "marker": "s", "mfc": "w"},
+    "dolfinx_esdirk4_uniform": {"color": "tab:red", "ls": "-", "marker": "s", "mfc": "w"},
+    "dolfinx_euler_graded": {"color": "tab:red", "ls": ":", "marker": "o"},
+    "dolfinx_esdirk4_graded": {"color": "tab:red", "ls": "-", "marker": "o"},
     "potential_order_2_uniform": {"color": "0.6", "ls": "-", "marker": "s", "mfc": "w"},
     "potential_order_2_graded": {"color": "0.6", "ls": "-", "marker": "o"},
     "potential_order_3_graded": {"color": "k", "ls": "-", "marker": "^"},
@@ -361,13 +469,15 @@ STYLES: dict[str, dict[str, Any]] = {
     "concentration_order_2_graded": {"color": "0.6", "ls": "--", "marker": "v"},
     "concentration_order_3_graded": {"color": "0.35", "ls": "--", "marker": "<", "mfc": "w"},
 }
-"""Marker, line and shade of each curve: readable in grey."""
+"""Marker, line and shade of each curve: ours readable in grey, good scripts in colour, one an engine."""
 
 
 def draw(comparison: Comparison) -> Figure:
     """Errors of area and pressure over seconds of the time loop."""
-    figure, (left, right) = plt.subplots(1, 2, figsize=(9.6, 4.6), sharex=True)
+    figure, (left, right) = plt.subplots(1, 2, figsize=(9.6, 5.4), sharex=True)
     for curve in comparison.curves:
+        if not curve.courses:
+            continue
         style = {"ms": 5, "lw": 1.1, **STYLES[curve.name]}
         left.loglog(curve.seconds, curve.area_errors(comparison.reference), label=curve.label, **style)
         pressures = curve.pressure_errors(comparison.reference)
@@ -379,8 +489,8 @@ def draw(comparison: Comparison) -> Figure:
     apart = {"color": "0.4", "lw": 0.9, "ls": (0, (1, 3))}
     left.axhline(comparison.reference.area_error(comparison.second), label="what two references differ by", **apart)
     right.axhline(comparison.reference.pressure_error(comparison.second), **apart)
-    left.set(xlabel="time loop [s]", ylabel="largest error of the area / area at 7000 s [-]", title="area")
-    right.set(xlabel="time loop [s]", ylabel="error of the pressure, rms / rms [-]", title="pressure")
+    left.set(xlabel="CPU time of the loop [s]", ylabel="largest error of the area / area at 7000 s [-]", title="area")
+    right.set(xlabel="CPU time of the loop [s]", ylabel="error of the pressure, rms / rms [-]", title="pressure")
     letter_panels([left, right])
-    figure.legend(loc="outside lower center", ncols=3, fontsize=8)
+    figure.legend(loc="outside lower center", ncols=3, fontsize=7)
     return figure

@@ -39,7 +39,12 @@ def test_speed_error(tmp_path, monkeypatch):
     monkeypatch.setattr(speed_error, "SCRIPT", tmp_path / "plain_ngsolve.py")  # absent: said, and the ratios left out
     numbers, rows = quick("speed_error", tmp_path / "out")
     assert "absent" in numbers["plain"]
-    assert not [key for key in numbers if key.startswith("ratio")]
+    assert not [key for key in numbers if key.startswith("ratio_to_plain")]
+    assert "absent" in numbers["dolfinx"]
+    for wanted in ("1e-2", "1e-3", "1e-4"):
+        assert numbers[f"ratio_to_best_rival_at_{wanted}"] > 0
+        assert numbers[f"best_rival_at_{wanted}"].startswith("good_ngsolve")
+        assert numbers[f"pressure_ratio_to_best_rival_at_{wanted}"] > 0
     assert numbers["reference_area_error"] < 1e-3  # tolerances of 1e-4 and 3e-4
     assert numbers["penalty_40_area_error"] < 1e-3
     errors = {(row[0], row[1]): float(row[8]) for row in rows[1:]}
