@@ -48,9 +48,7 @@ class Worker:
 
     def close(self) -> None:
         """End the process."""
-        if self._process.stdin is not None:
-            self._process.stdin.close()
-        self._process.wait()
+        self._process.communicate("")
 
 
 ABSENT = "absent: no python with DOLFINx 0.5; name one with --dolfinx"
