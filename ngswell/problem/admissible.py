@@ -33,7 +33,10 @@ SQUEEZED = 0.25
 
 
 class Admissible:
-    """Bounds of a state: those of every iterate, and those of a solution only."""
+    """Bounds of a state: those of every iterate, and those of a solution only.
+
+    They are looked at many times an iteration where matrices are kept: all at once, in one pass over the points.
+    """
 
     def __init__(self, discretisation: Discretisation, state: Any, fields: GridFunction) -> None:
         self._discretisation, self._state, self._fields = discretisation, state, fields
@@ -41,7 +44,7 @@ class Admissible:
     @cached_property
     def always(self) -> dict[str, CoefficientFunction]:
         """At the forms' own points, where laws are evaluated."""
-        return _compiled({CONTENT: self._state.content}) | self.of_ions | self._numbers
+        return {CONTENT: self._state.content} | self.of_ions | self._numbers
 
     @cached_property
     def _numbers(self) -> dict[str, CoefficientFunction]:
@@ -51,12 +54,12 @@ class Admissible:
 
     def least_content(self) -> float:
         """The smallest J − nS0 at the watched points [-]."""
-        return float(self.always[CONTENT](self._discretisation.points).min())
+        return float(self._values(solution=False)[:, 0].min())
 
     @cached_property
     def of_ions(self) -> dict[str, CoefficientFunction]:
         """The model's own among these."""
-        return _compiled(self._discretisation.model.bounds(self._state))
+        return self._discretisation.model.bounds(self._state)
 
     @cached_property
     def in_solutions(self) -> dict[str, CoefficientFunction]:
@@ -65,18 +68,37 @@ class Admissible:
         problem = self._discretisation
         if problem.setup.looks_back:
             return {}
-        return _compiled(problem.model.solution_bounds(self._state))
+        return problem.model.solution_bounds(self._state)
+
+    @cached_property
+    def _in_one(self) -> dict[bool, CoefficientFunction]:
+        """The bounds of iterates, and of solutions, as one vector each."""
+        each = {False: self.always, True: self.in_solutions}
+        return {solution: CF(tuple(bounds.values())).Compile() for solution, bounds in each.items() if bounds}
+
+    @cached_property
+    def _wet(self) -> float:
+        """A J − nS0 above which no watched point is squeezed [-]: it is nS0 nF / (1 − nF)."""
+        solid = CF(self._discretisation.setup.material.nS0)(self._discretisation.points).max()
+        return float(solid) * SQUEEZED / (1 - SQUEEZED)
+
+    def _values(self, solution: bool) -> NDArray:
+        points = self._discretisation.points
+        return self._in_one[solution](points).reshape(points.size, -1)
 
     def violation(self, solution: bool = False) -> Violation | None:
         """What leaves the physical range of iterates (or of a `solution`) at a watched point; None if nothing does."""
-        points = self._discretisation.points
-        for name, field in (self.in_solutions if solution else self.always).items():
-            values = field(points).ravel()
-            worst = int(np.argmin(np.where(np.isfinite(values), values, -np.inf)))
-            if not values[worst] > 0:
-                reason = Reason.IONS_RUN_OUT if name in self.of_ions else Reason.NOT_ADMISSIBLE
-                return Violation(name, self._place(points[worst : worst + 1]), reason)
-        return None if solution else self.turned()
+        bounds = self.in_solutions if solution else self.always
+        if not bounds:
+            return None
+        values = self._values(solution)
+        if not (values.min() > 0 and values.max() < np.inf):  # not so of NaN
+            for name, column in zip(bounds, values.T, strict=True):
+                worst = int(np.argmin(np.where(np.isfinite(column), column, -np.inf)))
+                if not np.inf > column[worst] > 0:
+                    reason = Reason.IONS_RUN_OUT if name in self.of_ions else Reason.NOT_ADMISSIBLE
+                    return Violation(name, self._place(self._discretisation.points[worst : worst + 1]), reason)
+        return None if solution or values[:, 0].min() > self._wet else self.turned()
 
     def turned(self, fluid: float = SQUEEZED) -> Violation | None:
         """A cell that has turned over at a corner, and is squeezed: at a point of its own, at most this share is fluid.
@@ -84,12 +106,12 @@ class Admissible:
         Where a bonded edge meets a wet side the strain is singular, and J at the corner overshoots, below nS0 and even below
         zero, while no law sees it and the solution converges.
         """
-        at_corners = self._J(self._corners).ravel()
+        at_corners = self._state.J(self._corners).ravel()
         if at_corners.min() > 0:
             return None
         points = self._discretisation.points
         least = np.ones(self._discretisation.mesh.ne)
-        np.minimum.at(least, points["nr"], self._nF(points).ravel())
+        np.minimum.at(least, points["nr"], self._state.nF(points).ravel())
         at_corners[least[self._corners["nr"]] > fluid] = np.inf
         worst = int(np.argmin(at_corners))
         if at_corners[worst] > 0:
@@ -97,20 +119,8 @@ class Admissible:
         return Violation(TURNED, self._place(self._corners[worst : worst + 1]), Reason.TURNS_OVER)
 
     @cached_property
-    def _J(self) -> CoefficientFunction:
-        return self._state.J.Compile()
-
-    @cached_property
-    def _nF(self) -> CoefficientFunction:
-        return self._state.nF.Compile()
-
-    @cached_property
     def _corners(self) -> NDArray:
         return corners(self._discretisation.mesh)
 
     def _place(self, where: NDArray) -> tuple[float, ...]:
         return tuple(map(float, CF((x, y, z)[: self._discretisation.mesh.dim])(where).ravel()))
-
-
-def _compiled(bounds: dict[str, CoefficientFunction]) -> dict[str, CoefficientFunction]:
-    return {name: field.Compile() for name, field in bounds.items()}
