@@ -8,14 +8,21 @@ Tolerance 1e-3, both models with their default baths, one thread. For each MODEL
 - `iteration_ms`: time of the loop over Newton iterations, as it is with old matrices kept; `iterations_per_matrix`;
 - `overhead`: time of the loop over (factorisations × `factorise_ms` + solves × `solve_ms`);
 - `unknowns`. What a matrix and its factors take: study `growth`.
+
+`loop_over_linear_algebra_MODEL_NX_1_thread` (NX: 44, 88) is `overhead`. With `--dolfinx PYTHON` (see `speed_error`) the same
+models on the same meshes, order and quadrature in DOLFINx with generated C kernels and MUMPS, in a process of their own just
+before ours: `PART_over_rival_MODEL_NX` is our time over theirs, PART one of `tangent`, `residual`, `factorise`, `solve`
+and `full_iteration` (the sum of these four); `rival_MODEL_MESH_PART_ms` theirs. `quadrature_points`,
+`rival_quadrature_points`: in a cell. `dolfinx`: what it is, or that it is absent. All are CPU times.
 """
 
 from __future__ import annotations
 
+import argparse
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from statistics import median
-from time import perf_counter
+from time import process_time
 
 import matplotlib.pyplot as plt
 from matplotlib.figure import Figure
@@ -26,10 +33,12 @@ from ngswell import Adaptive, Concentration, Potential, Progress, Result, Scene
 from ngswell.models.model import Model
 from ngswell.solve.direct import solver_of
 from studies.output import Findings, cost, letter_panels
+from studies.rivals.worker import ABSENT, add_dolfinx, kernels, machine, usable
 from studies.scenes import INITIAL, free_swelling_block, with_model
 
 UNTIL = 7220.0  # s
 PARTS = ("tangent", "residual", "bounds", "factorise", "solve")
+RIVAL_PARTS = ("tangent", "residual", "factorise", "solve")
 MESHES = {"44x40": (44, 40), "88x80": (88, 80)}
 QUICK_MESHES = {"44x40": (11, 10), "88x80": (22, 20)}
 """The keys stay those of the full size."""
@@ -46,6 +55,9 @@ class IterationCost:
     parts: dict[str, float]
     unknowns: int
     result: Result
+    seconds: float  # CPU time of the run
+    points: int  # of the quadrature in a cell
+    rival: dict[str, float] | None  # DOLFINx's
 
     @property
     def label(self) -> str:
@@ -57,18 +69,40 @@ class IterationCost:
         return {
             **{f"{part}_ms": self.parts[part] for part in PARTS},
             "full_iteration_ms": sum(self.parts[part] for part in PARTS),
-            "iteration_ms": 1e3 * self.result.seconds / self.result.iterations,
+            "iteration_ms": 1e3 * self.seconds / self.result.iterations,
             "iterations_per_matrix": self.result.iterations / self.result.factorisations,
-            "overhead": 1e3 * self.result.seconds / linear,
+            "overhead": 1e3 * self.seconds / linear,
             "unknowns": self.unknowns,
         }
 
+    def compared(self) -> dict[str, float | int]:
+        """How it stands to its factorisations and solves, and to the rival."""
+        case = f"{self.model}_{self.mesh.split('x')[0]}"
+        found: dict[str, float | int] = {f"loop_over_linear_algebra_{case}_1_thread": self.found()["overhead"]}
+        if self.rival:
+            theirs = {part: self.rival[f"{part}_ms"] for part in RIVAL_PARTS}
+            found |= {f"rival_{self.label}_{part}_ms": theirs[part] for part in RIVAL_PARTS}
+            found |= {f"{part}_over_rival_{case}": self.parts[part] / theirs[part] for part in RIVAL_PARTS}
+            both = (sum(times[part] for part in RIVAL_PARTS) for times in (self.parts, theirs))
+            found[f"full_iteration_over_rival_{case}"] = next(both) / next(both)
+            found["rival_quadrature_points"] = int(self.rival["points"])
+        return found
 
-def run(quick: bool = False) -> Findings:
+
+def options(parser: argparse.ArgumentParser) -> None:
+    """`--dolfinx PYTHON`, which `speed_error` has as well."""
+    add_dolfinx(parser)
+
+
+def run(quick: bool = False, dolfinx: str | None = None) -> Findings:
     """Both models, two meshes."""
     meshes, turns = (QUICK_MESHES, 3) if quick else (MESHES, 7)
-    costs = compute(meshes, turns)
+    there = usable(dolfinx)
+    costs = compute(meshes, turns, dolfinx if there else None)
     numbers: dict[str, float | int | str] = {f"{c.label}_{key}": value for c in costs for key, value in c.found().items()}
+    for each in costs:
+        numbers |= each.compared()
+    numbers |= {"quadrature_points": costs[0].points, "dolfinx": there or ABSENT, "machine": machine()}
     numbers |= {"mesh": ", ".join(f"{nx} x {ny}" for nx, ny in meshes.values()), **cost([c.result for c in costs])}
     header = ("case", *costs[0].found(), "newton_iterations", "factorisations", "solves", "seconds")
     rows = [
@@ -78,22 +112,31 @@ def run(quick: bool = False) -> Findings:
     return Findings(draw(costs, list(meshes.values())), header, rows, numbers)
 
 
-def compute(meshes: dict[str, tuple[int, int]], turns: int) -> list[IterationCost]:
-    """Every model on every mesh, on one thread."""
+def compute(meshes: dict[str, tuple[int, int]], turns: int, dolfinx: str | None = None) -> list[IterationCost]:
+    """Every model on every mesh, on one thread; the rival's kernels by the python `dolfinx`."""
     threads_before = ngsglobals.numthreads
     SetNumThreads(1)
     try:
-        return [measure(mesh, cells, model, turns) for mesh, cells in meshes.items() for model in MODELS]
+        costs = []
+        for mesh, cells in meshes.items():
+            rivals = kernels(dolfinx, cells) if dolfinx else {}
+            costs += [measure(mesh, cells, model, turns, rivals.get(model)) for model in MODELS]
+        return costs
     finally:
         SetNumThreads(threads_before)
 
 
-def measure(mesh: str, cells: tuple[int, int], model: str, turns: int) -> IterationCost:
+def measure(
+    mesh: str, cells: tuple[int, int], model: str, turns: int, rival: dict[str, float] | None = None
+) -> IterationCost:
     """One run from rest, and the parts of an iteration at its end."""
     scene = with_model(free_swelling_block(*cells), MODELS[model])
     rest = scene.equilibrate(INITIAL)
+    clock = process_time()
     result = scene.run(UNTIL, Adaptive(1e-3), [Progress(f"iteration {model}_{mesh}")], resume=rest)
-    return IterationCost(mesh, model, alone(scene, result, turns), result.end.values.size, result)
+    seconds = process_time() - clock
+    points = len(scene.problem.points) // scene.mesh.ne
+    return IterationCost(mesh, model, alone(scene, result, turns), result.end.values.size, result, seconds, points, rival)
 
 
 def alone(scene: Scene, result: Result, turns: int) -> dict[str, float]:
@@ -117,9 +160,9 @@ def alone(scene: Scene, result: Result, turns: int) -> dict[str, float]:
         taken: dict[str, list[float]] = {name: [] for name in parts}
         for _ in range(turns):
             for name, part in parts.items():
-                clock = perf_counter()
+                clock = process_time()
                 part()
-                taken[name].append(1e3 * (perf_counter() - clock))
+                taken[name].append(1e3 * (process_time() - clock))
     return {name: median(times) for name, times in taken.items()}
 
 

@@ -254,7 +254,11 @@ def kernels(cells: tuple[int, int], model: str, turns: int = 7) -> dict[str, flo
             clock = process_time()
             action()
             taken[name].append(1e3 * (process_time() - clock))
-    return {**{f"{name}_ms": median(times) for name, times in taken.items()}, "unknowns": block.unknowns, "points": 16}
+    return {
+        **{f"{name}_ms": median(times) for name, times in taken.items()},
+        "unknowns": block.unknowns,
+        "points": (block.grid.order + 2) ** 2,
+    }
 
 
 def versions() -> str:

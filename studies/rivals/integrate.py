@@ -213,11 +213,11 @@ class Run:
                 if not np.isfinite(size) or size > 1e3:
                     break
                 x -= correction
-                theta = size / before if before else min(self.contraction, 0.5)
+                theta = size / before if before else min(max(self.contraction, abs(1 - step / self.factored)), 0.5)
                 if before and theta >= 0.9:
                     break
                 if theta / (1 - theta) * size <= NEWTON * self.tolerance:
-                    self.contraction = theta if before else 0.9 * self.contraction
+                    self.contraction = theta if before else self.contraction
                     return x
                 before = size
             if fresh:

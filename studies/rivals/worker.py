@@ -12,16 +12,15 @@ from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).resolve().parents[2]
-ENVIRONMENT = dict.fromkeys(("NGS_NUM_THREADS", "OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+ONE_THREAD = dict.fromkeys(("NGS_NUM_THREADS", "OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 
 
 class Worker:
     """`python -m module --serve` with options of `integrate.serve`: one thread, compilers' words kept away."""
 
     def __init__(self, python: str, module: str, options: Sequence[object]) -> None:
-        environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
         self._process = subprocess.Popen(
-            [python, "-m", module, "--serve", *map(str, options)], cwd=ROOT, env={**environment, **ENVIRONMENT}, text=True,
+            [python, "-m", module, "--serve", *map(str, options)], cwd=ROOT, env=_environment(), text=True,
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
         )  # fmt: skip
         self.setup: float | None = None
@@ -70,13 +69,27 @@ def usable(python: str | None) -> str | None:
 def versions(python: str) -> str | None:
     """What DOLFINx another python has; None if it has none that `dolfinx_block` can use."""
     try:
-        done = subprocess.run(
-            [python, "-m", "studies.rivals.dolfinx_block", "--versions"], cwd=ROOT, capture_output=True, text=True,
-            env={name: value for name, value in os.environ.items() if name != "PYTHONPATH"},
-        )  # fmt: skip
+        done = _once(python, "--versions")
     except OSError:
         return None
     return done.stdout.strip() if done.returncode == 0 else None
+
+
+def kernels(python: str, cells: tuple[int, int]) -> dict[str, dict[str, float]]:
+    """Milliseconds of the parts of an iteration in DOLFINx, by model: see `dolfinx_block`."""
+    lines = _once(python, "--kernels", "{}x{}".format(*cells)).stdout.splitlines()
+    answers = [json.loads(line) for line in lines if line.startswith("{")]
+    return {answer["model"]: answer for answer in answers}
+
+
+def _once(python: str, *options: str) -> subprocess.CompletedProcess[str]:
+    command = [python, "-m", "studies.rivals.dolfinx_block", *options]
+    return subprocess.run(command, cwd=ROOT, env=_environment(), capture_output=True, text=True)
+
+
+def _environment() -> dict[str, str]:
+    """One thread, and nothing of the python that runs the studies."""
+    return {**{name: value for name, value in os.environ.items() if name != "PYTHONPATH"}, **ONE_THREAD}
 
 
 def machine() -> str:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -9,6 +11,7 @@ from ngswell.stepping import stepper
 from ngswell.stepping.sizes import Sizes
 from studies.__main__ import main
 from studies.choices import speed_error
+from studies.choices.iteration import PARTS, IterationCost
 from studies.choices.random_runs import errors, random_run
 from studies.choices.speed_error import ComputedBlock, Reference, seconds_at
 from tests.studies.quick import quick
@@ -64,6 +67,23 @@ def test_iteration(tmp_path):
         # No times are compared: machines are shared. Old matrices serve several iterations whatever the machine does.
         assert numbers[f"{case}_iterations_per_matrix"] > 2
         assert all(numbers[f"{case}_{part}_ms"] > 0 for part in ("tangent", "residual", "factorise", "solve", "iteration"))
+    assert numbers["loop_over_linear_algebra_potential_44_1_thread"] == numbers["potential_44x40_overhead"]
+    assert numbers["quadrature_points"] == 16  # order 6 on quadrilaterals
+    assert "absent" in numbers["dolfinx"]
+    assert not [key for key in numbers if "rival" in key]
+
+
+def test_an_iteration_over_the_rivals():
+    ours = dict.fromkeys(PARTS, 6.0)
+    run = SimpleNamespace(factorisations=10, solves=30, iterations=20)
+    rival = {"tangent_ms": 2.0, "residual_ms": 3.0, "factorise_ms": 4.0, "solve_ms": 1.0, "points": 16}
+    found = IterationCost("88x80", "concentration", ours, 1, run, 0.48, 16, rival).compared()
+    assert found["tangent_over_rival_concentration_88"] == 3.0
+    assert found["residual_over_rival_concentration_88"] == 2.0
+    assert found["full_iteration_over_rival_concentration_88"] == 2.4
+    assert found["rival_concentration_88x80_solve_ms"] == 1.0
+    assert found["loop_over_linear_algebra_concentration_88_1_thread"] == pytest.approx(2.0)  # 480 ms over 40 times 6 ms
+    assert not [key for key in IterationCost("44x40", "potential", ours, 1, run, 1.0, 16, None).compared() if "rival" in key]
 
 
 def test_tolerance(tmp_path):
