@@ -11,8 +11,8 @@ rest. Numbers (areas are relative to the area at 7000 s; errors are estimates of
 - `area_ratio_7220`, `area_ratio_11000`: with `..._step_error` from a run of fourth order in time at a quarter of the
   tolerance, and `..._mesh_error` from one more on a mesh 1.5 times finer (second order assumed); likewise for `core_J_min`;
 - `area_ratio_equilibrium`: when nothing moves any more, with `closed_form_area_ratio_equilibrium`;
-- `ramp_seconds`, `equilibrate_seconds`, `ramp_over_equilibrate`: seconds of one processor to the state
-  at 7000 s by ramp and directly;
+- `ramp_seconds`, `equilibrate_seconds`, `ramp_over_equilibrate`: seconds of one processor to the
+  state at 7000 s by ramp and directly;
 - `fluid_imbalance`, `cation_imbalance`: closure of the ledger relative to the content.
 """
 
@@ -86,14 +86,13 @@ class WatchedBlock:
 
 @dataclass(frozen=True)
 class Swelling:
-    """The block by the paper's scheme, its pictures and ledger, the seconds of one processor to its swollen state, and its way
-    to rest."""
+    """The block by the paper's scheme, its pictures and ledger, what its swollen state cost, and its way to rest."""
 
     scene: Scene
     watched: WatchedBlock
     ledger: Ledger
     pictures: Snapshots
-    ramp_seconds: float | None
+    ramp_seconds: float | None  # of one processor; None where there was no ramp
     to_rest: Result
     rest: Area
 
