@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from hashlib import sha256
 
 import numpy as np
@@ -32,6 +33,7 @@ def points_and_corners(mesh: Mesh, region: object, order: int) -> NDArray:
     return mesh.MapToAllElements({shape: with_corners(shape, order) for shape in CORNERS}, region)
 
 
+@cache
 def with_corners(shape: ET, order: int) -> IntegrationRule:
     """The integration rule of degree `order` on a cell, and its corners with no weight."""
     rule, corners = IntegrationRule(shape, order), CORNERS[shape]

@@ -189,16 +189,18 @@ class CondensedSolver(LinearSolver):
     def __init__(self, form: BilinearForm, free: BitArray, name: str | None = None) -> None:
         super().__init__(free & form.space.FreeDofs(True), name)
         self._form = form
+        self._reduced: BaseVector | None = None
 
     def linearise(self, problem: Problem) -> BaseMatrix:
         self._form.AssembleLinearization(problem.fields.vec)
         return self._form.mat
 
     def solve(self, right: BaseVector, solution: BaseVector, prescribed: BaseVector | None = None) -> bool:
-        reduced = right.CreateVector()
-        reduced.data = right
-        reduced.data += self._form.harmonic_extension_trans * right
-        solved = super().solve(reduced, solution, prescribed)
+        if self._reduced is None:
+            self._reduced = right.CreateVector()
+        self._reduced.data = right
+        self._reduced.data += self._form.harmonic_extension_trans * right
+        solved = super().solve(self._reduced, solution, prescribed)
         solution.data += self._form.inner_solve * right
         solution.data += self._form.harmonic_extension * solution
         return solved and bool(np.isfinite(solution.FV().NumPy()).all())

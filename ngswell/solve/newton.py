@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from math import inf
 
-import numpy as np
 from ngsolve import BaseVector
+from numpy.typing import NDArray
 
 from ngswell import checks
 from ngswell.errors import Failure, Reason
@@ -105,8 +105,8 @@ class _Iteration:
         self.small = bool(shares)
         least = min(1.0, ROUND_OFF / method.tolerance)
         self.wanted = {name: max(shares.get(name, 1.0), least) * size for name, size in problem.references.items()}
-        vectors = (problem.fields.vec.CreateVector() for _ in range(4))
-        self.residual, self.correction, self.simplified, self._gap = vectors
+        vectors = (problem.fields.vec.CreateVector() for _ in range(5))
+        self.residual, self.correction, self.simplified, self._gap, self._start = vectors
         self.correction[:] = 0.0
         self.count = 0
         self.beyond: Violation | None = None  # what the last correction would leave the physical range with
@@ -144,13 +144,14 @@ class _Iteration:
         With a `fresh` matrix the step is halved until the fields are admissible and the simplified correction is smaller;
         with an old one a step that does not help at once is taken back.
         """
-        problem, vector, method = self.problem, self.problem.vector, self.method
-        before, start = self._size(self.correction), vector.copy()
+        problem, fields, method = self.problem, self.problem.fields.vec, self.method
+        before, start = self._size(self.correction), self._start
+        start.data = fields
         damping, rate, least = 1.0, inf, SHORTEST
         while True:
-            vector[:] = start - damping * self.correction.FV().NumPy()
+            fields.data = start - damping * self.correction
             if self.from_above:
-                problem.keep_positive(start)
+                problem.keep_positive(start.FV().NumPy())
             refused = problem.admissible.violation()
             self.beyond = refused or (self.beyond if damping < 1.0 else None)
             if refused is None:
@@ -170,7 +171,7 @@ class _Iteration:
                 break
             damping /= 2
             if damping < least:
-                vector[:] = start
+                fields.data = start
                 if self.from_above and self._is_round_off():
                     return self._success(), True, damping
                 if self.beyond:
@@ -179,7 +180,7 @@ class _Iteration:
                     return None, True, 1.0
                 return self._failed(Reason.STALLED), False, damping
         if not fresh and (refused or not rate < 1):
-            vector[:] = start
+            fields.data = start
             problem.residual(self.residual)
             return None, False, damping
         self.factorisation.contracted(rate)
@@ -202,11 +203,11 @@ class _Iteration:
 
     def _finish(self) -> Outcome:
         """Apply the simplified correction that passed the test as well."""
-        vector = self.problem.vector
-        converged = vector.copy()
-        vector -= self.simplified.FV().NumPy()
+        fields, converged = self.problem.fields.vec, self._start
+        converged.data = fields
+        fields -= self.simplified
         if self.problem.admissible.violation():  # at the edge of the physical range even what is left may be too much
-            vector[:] = converged
+            fields.data = converged
         return self._success()
 
     def _solve(self, solution: BaseVector) -> bool:
@@ -231,7 +232,7 @@ class _Iteration:
     def _size(self, change: BaseVector, units: dict[str, float] | None = None) -> float:
         """The largest coefficient of any field, in units of its reference."""
         problem, values, units = self.problem, change.FV().NumPy(), units or self.problem.references
-        return max(float(np.abs(values[problem.ranges[n]]).max()) / units[n] for n in problem.names)
+        return max(_largest(values[problem.ranges[name]]) / units[name] for name in problem.names)
 
     def _success(self) -> Outcome:
         violation = self.problem.admissible.violation(solution=True)
@@ -242,3 +243,8 @@ class _Iteration:
 
     def _failed(self, reason: Reason, what: str = "") -> Outcome:
         return Outcome(self.count, Failure(reason, *self.problem.worst(self.correction.FV().NumPy()), what))
+
+
+def _largest(values: NDArray) -> float:
+    """max |values|, without a copy."""
+    return max(float(values.max()), -float(values.min()))
