@@ -181,7 +181,7 @@ class Attempts:
         guess = polynomial_at(sorted(points, key=lambda point: abs(point[0] - at))[:3], at)
         self.problem.begin_stage(at, inner, right, guess)
         outcome = self._solve(inner)
-        if outcome.failure:
+        if outcome.failure and len(points) > 1:  # else the old state is what it started from
             self.problem.begin_stage(at, inner, right, old)
             outcome = self._solve(inner)
         if outcome.failure and self._from_above:

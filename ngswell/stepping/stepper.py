@@ -47,6 +47,10 @@ SAFETY, SAFETY_AFTER_KINK = 1.5, 5.0
 scenes reach errors below three times the tolerance (`python -m studies tolerance`)."""
 
 
+AFTER_KINK = 1
+"""Power of the step that errors fall with just after a kink, where layers are thinner than cells: measured 0.5 to 1.5."""
+
+
 class Failed(Exception):
     """No attempt succeeded: from which time [s], with which last and first step [s], and why the last one failed."""
 
@@ -221,7 +225,8 @@ class Stepper:
             self._wanted = dt / 4
             return last, again
         error = rejection.error
-        power = scheme.power if last is None else np.log(last.error / error) / np.log(last.dt / dt)
+        usual = AFTER_KINK if scheme.embedded and not self._points else scheme.power
+        power = usual if last is None else np.log(last.error / error) / np.log(last.dt / dt)
         self._wanted = self.control.next(dt, error, np.clip(power, 1, scheme.power))
         return rejection, bool(power < STUCK)
 
