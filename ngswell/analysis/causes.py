@@ -10,7 +10,6 @@ from ngswell.errors import Failure, NgswellError, Reason, place
 from ngswell.mesh.points import vertices, vertices_of
 from ngswell.models.term import Role
 from ngswell.physics import donnan
-from ngswell.problem.forms import form
 from ngswell.problem.problem import Problem
 from ngswell.setup.snapshot import Snapshot
 from ngswell.solve.direct import LinearSolver
@@ -58,7 +57,7 @@ def forces_left(problem: Problem) -> tuple[float, tuple[float, ...], bool]:
         free[tie.dofs[0]] = 1.0
     left, largest, loads = np.zeros(problem.vector.size), 0.0, np.zeros(problem.vector.size)
     for term in problem.terms:
-        form(problem, [term], 0.0).Apply(problem.fields.vec, force)
+        problem.form([term], 0.0).apply(force)
         share = force.FV().NumPy()[u].copy()
         for tie in problem.ties:
             share[tie.dofs[0]] = share[tie.dofs].sum()

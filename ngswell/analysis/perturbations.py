@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ngswell.errors import NgswellError, place
 from ngswell.models.term import Kind
-from ngswell.problem.forms import form
+from ngswell.problem.forms import Form
 from ngswell.problem.problem import Problem
 from ngswell.solve.direct import CondensedSolver, LinearSolver
 
@@ -70,10 +70,10 @@ class Perturbations:
 
     def __init__(self, problem: Problem, solver: LinearSolver | None = None) -> None:
         self.problem = problem
-        self._system: BilinearForm | None = None
+        self._system: Form | None = None
         if solver is None:
             whole = problem.reaches_inside
-            self._system = form(problem, problem.terms, 1 / problem.dt, condense=not whole)
+            self._system = problem.form(problem.terms, 1 / problem.dt, condense=not whole)
             solver = LinearSolver(problem.free) if whole else CondensedSolver(self._system, problem.free)
         self._solver = solver
         trial, test = problem.space.TnT()
@@ -94,8 +94,7 @@ class Perturbations:
         if self._system is None:
             ready = self._solver.renew(self.problem)
         else:
-            self._system.AssembleLinearization(self.problem.fields.vec)
-            ready = self._solver.prepare(self._system.mat, self.problem.ties)
+            ready = self._solver.prepare(self._system.linearise(), self.problem.ties)
         self.problem.dt.Set(step)
         if not ready:
             raise NgswellError(f"the linearised balances are singular or not finite for perturbations of rate {rate:g} 1/s")
@@ -193,12 +192,11 @@ class Perturbations:
         Where that runs into a slower mode, `mode` and the middle between the bounds.
         """
         scale = self.problem.sizes
-        contents = form(self.problem, [term for term in self.problem.terms if term.kind is Kind.RATE])
-        contents.AssembleLinearization(self.problem.fields.vec)
+        rates = self.problem.form([term for term in self.problem.terms if term.kind is Kind.RATE]).linearise()
         shift, first = low, mode
         for _ in range(5):
             self._factorise(shift)
-            response = self._respond(self._product(contents.mat, mode))
+            response = self._respond(self._product(rates, mode))
             scaled, old = response / scale, mode / scale
             inverse = float(scaled @ old / (old @ old))
             rate = shift - 1 / inverse

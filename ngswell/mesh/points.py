@@ -23,9 +23,14 @@ CORNERS: dict[ET, list[tuple[float, ...]]] = {
 """Corners of the reference cells."""
 
 
+def rules(order: int) -> dict[ET, IntegrationRule]:
+    """Integration rules of degree `order`, by shape of cell."""
+    return {shape: IntegrationRule(shape, order) for shape in _SHAPES}
+
+
 def points(mesh: Mesh, region: object = VOL, order: int = 4) -> NDArray:
     """Mapped integration points of degree `order` on all elements of `region`; any CoefficientFunction takes them."""
-    return mesh.MapToAllElements({shape: IntegrationRule(shape, order) for shape in _SHAPES}, region)
+    return mesh.MapToAllElements(rules(order), region)
 
 
 def points_and_corners(mesh: Mesh, region: object, order: int) -> NDArray:

@@ -133,9 +133,10 @@ class SolidState:
 
     def momentum(self, pore_pressure: CoefficientFunction, v: CoefficientFunction) -> list[Term]:
         """Momentum balance (16) with the extra stress from the energy of the material's law; loads add their terms."""
+        m = self.material
         power = InnerProduct(self.cofactor, self.kinematics.gradient(v))
         return [
-            Term("momentum", "solid", self.material.solid.energy(self.deformation, self.material), Kind.ENERGY),
+            Term("momentum", "solid", m.solid.energy(self.deformation, m), Kind.ENERGY, apart=m.kinked),
             Term("momentum", "pore pressure", -pore_pressure * power),
         ]
 

@@ -33,7 +33,8 @@ class Term:
 
     Integrated over `boundary` if that is named, else over the body. On a boundary, fields have tangential derivatives only,
     unless the term asks for `normal_derivatives`. A content that `lumps` is taken at vertices where its
-    integrals fail. Derivatives of a `kinked` term jump with the unknowns.
+    integrals fail. Derivatives of a `kinked` term jump with the unknowns. A term of very many parts, such as an energy of
+    fibres in all directions, stays `apart` from the others: as one expression its derivatives would be too long.
     """
 
     balance: str
@@ -45,6 +46,7 @@ class Term:
     normal_derivatives: bool = False
     lumps: bool = False
     kinked: bool = False
+    apart: bool = False
 
     def __str__(self) -> str:
         return f"{self.balance}: {self.name}" + (f" [{self.boundary}]" if self.boundary else "")

@@ -7,7 +7,6 @@ from numpy.typing import NDArray
 
 from ngswell.mesh.points import vertices_of
 from ngswell.models.term import Kind, Role
-from ngswell.problem.forms import form
 from ngswell.problem.problem import Problem
 
 
@@ -28,10 +27,10 @@ class Effluxes:
         }
         balances, baths = {*problem.model.balanced, *problem.numbers}, {bath.boundary for bath in problem.setup.baths}
         flows = [term for term in problem.terms if term.balance in balances and term.kind is not Kind.RATE]
-        self._flows = form(problem, [term for term in flows if term.role is not Role.EFFLUX or term.boundary not in baths])
+        self._flows = problem.form([term for term in flows if term.role is not Role.EFFLUX or term.boundary not in baths])
         given = [term for term in flows if term.role is Role.EFFLUX and term.boundary not in baths]
         self._given = {
-            boundary: form(problem, [term for term in given if term.boundary == boundary])
+            boundary: problem.form([term for term in given if term.boundary == boundary])
             for boundary in dict.fromkeys(str(term.boundary) for term in given)
         }
         self.vertices: dict[str, NDArray] = {}
@@ -53,14 +52,14 @@ class Effluxes:
 
     def flows(self) -> NDArray:
         """What flows off inside the body in unit time, at the present fields; a view that the next call changes."""
-        self._flows.Apply(self._problem.fields.vec, self._vector)
+        self._flows.apply(self._vector)
         return self._vector.FV().NumPy()
 
     def given(self) -> dict[tuple[str, str], float]:
         """What loads take out through their boundaries in unit time, by balance and boundary."""
         found, vector = {}, self._problem.fields.vec.CreateVector()
         for boundary, flux in self._given.items():
-            flux.Apply(self._problem.fields.vec, vector)
+            flux.apply(vector)
             for name, unknown in self._problem.model.balanced.items():
                 start = self._problem.ranges[unknown].start
                 found[name, boundary] = float(vector.FV().NumPy()[start : start + self._problem.mesh.nv].sum())

@@ -15,7 +15,6 @@ from ngswell.errors import InputError
 from ngswell.mesh.points import vertices_of
 from ngswell.models.term import Role, Term
 from ngswell.observers.records import Recorder, power_of_mm
-from ngswell.problem.forms import form
 from ngswell.problem.problem import Problem
 from ngswell.setup.setup import Setup
 from ngswell.streams import CSV
@@ -80,7 +79,7 @@ class Reaction(Recorder):
         firsts = [displacement.start + axis * per_component for axis in range(len(directions))]
         self._vertices = [slice(first, first + problem.mesh.nv) for first in firsts]
         mine = [term for term in pushed if term.boundary in names]
-        self._pushes = form(problem, mine) if mine else None
+        self._pushes = problem.form(mine) if mine else None
         self._lacks, self._unit = problem.fields.vec.CreateVector(), UNITS[power_of_mm(problem) - 1]
 
     def unit(self, name: str) -> str:
@@ -91,7 +90,7 @@ class Reaction(Recorder):
         lacks = self._lacks.FV().NumPy()
         force = np.array([-lacks[dofs].sum() for dofs in self._dofs])
         if self._pushes is not None:
-            self._pushes.Apply(problem.fields.vec, self._lacks)
+            self._pushes.apply(self._lacks)
             force += [lacks[part].sum() for part in self._vertices]
         return {"force": force}
 

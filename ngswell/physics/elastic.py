@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ngsolve import CoefficientFunction, InnerProduct, exp, log
+from ngsolve import CoefficientFunction, Trace, exp, log
 
 from ngswell import checks
 from ngswell.physics.solid import Deformation, SolidParameters
@@ -74,4 +74,4 @@ class HolmesMowSolid:
 def second_invariant(deformation: Deformation) -> CoefficientFunction:
     """I₂ = (tr² C − tr C²)/2 [-]."""
     C = deformation.F.trans * deformation.F
-    return (deformation.I1 * deformation.I1 - InnerProduct(C, C)) / 2
+    return (deformation.I1 * deformation.I1 - Trace(C * C)) / 2

@@ -6,12 +6,12 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
-from ngsolve import BND, CF, H1, VOL, BitArray, Compress, FESpace, GridFunction, NumberSpace
+from ngsolve import BND, CF, ET, H1, VOL, BitArray, Compress, FESpace, GridFunction, IntegrationRule, NumberSpace
 from numpy.typing import NDArray
 
 from ngswell import checks
 from ngswell.errors import InputError, place
-from ngswell.mesh.points import points, vertices, vertices_of
+from ngswell.mesh.points import rules, vertices, vertices_of
 from ngswell.models.model import BathFields, FieldContext
 from ngswell.models.one_number import OneNumber
 from ngswell.problem.lumping import Storage
@@ -75,9 +75,14 @@ class Discretisation:
         return free
 
     @cached_property
+    def rules(self) -> dict[ET, IntegrationRule]:
+        """The integration rules of all forms over the body, whatever terms they have."""
+        return rules(2 * self.model.order + BONUS_ORDER)
+
+    @cached_property
     def points(self) -> NDArray:
-        """The integration points of the forms over the body."""
-        return points(self.mesh, VOL, 2 * self.model.order + BONUS_ORDER)
+        """Their integration points."""
+        return self.mesh.MapToAllElements(self.rules, VOL)
 
     @cached_property
     def storage(self) -> Storage:

@@ -1,52 +1,149 @@
-"""Terms as integrals for NGSolve's forms."""
+"""Terms as NGSolve's bilinear forms: residuals and tangents."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from functools import cached_property
 from typing import Any
 
-from ngsolve import BilinearForm, Variation, ds, dx
+from ngsolve import BaseMatrix, BaseVector, BilinearForm, BitArray, Variation, ds, dx, ngsglobals
+from ngsolve.comp import SumOfIntegrals
 
 from ngswell.models.term import Kind, Role, Term
+from ngswell.problem.body import Body, NotDerivable, Unknowns
 from ngswell.problem.discretisation import BONUS_ORDER, Discretisation
 from ngswell.problem.lumping import VERTEX_RULES
 
 
-def integral(discretisation: Discretisation, term: Term, factor: Any = None) -> Any:
-    """A term over its part of the body or of its boundary, for a BilinearForm."""
-    weight = discretisation.kinematics.weight
-    integrand = ((weight if factor is None else factor * weight) * term.integrand).Compile()
-    if term.boundary is not None:
-        region = discretisation.mesh.Boundaries(term.boundary)
-        # At the ends of a 1-d mesh NGSolve's normal points outwards as seen from the cell only.
-        in_cells = term.normal_derivatives or (discretisation.mesh.dim == 1 and term.role is Role.LOAD)
-        return integrand * ds(definedon=region, bonus_intorder=BONUS_ORDER, skeleton=in_cells)
-    over_body = integrand * dx(bonus_intorder=BONUS_ORDER)
-    return Variation(over_body) if term.kind is Kind.ENERGY else over_body
+class Form:
+    """The sum of terms as a form of the fields; those of kind RATE with the factor `rates`, such as 1/Δt.
 
-
-def content_integrals(discretisation: Discretisation, term: Term, factor: Any = None) -> list[Any]:
-    """A content that lumps over the cells where contents are integrals, and over those where they are lumped at the corners.
-
-    At a corner no other function than that of its vertex is there.
+    Terms over the body are taken together and differentiated symbolically (`body`), where all of them can be. All others
+    are an integral each, which NGSolve differentiates as it evaluates it.
     """
-    storage = discretisation.storage
-    of_cell = discretisation.kinematics.weight * term.integrand
-    of_corner = storage.vertex_weights * term.integrand
-    if factor is not None:
-        of_cell, of_corner = factor * of_cell, factor * of_corner
-    return [
-        of_cell.Compile() * dx(bonus_intorder=BONUS_ORDER, definedonelements=storage.integrated),
-        of_corner.Compile() * dx(intrules=VERTEX_RULES, definedonelements=storage.lumped),
-    ]
+
+    def __init__(
+        self,
+        discretisation: Discretisation,
+        unknowns: Unknowns,
+        terms: Sequence[Term],
+        rates: Any = None,
+        condense: bool = False,
+    ) -> None:
+        self.condense, self._fields = condense, unknowns.fields
+        self._discretisation, self._unknowns, self._rates = discretisation, unknowns, rates
+        self._terms = terms
+
+    def apply(self, result: BaseVector) -> None:
+        """The form at the present fields, on all degrees of freedom."""
+        self._applied.Apply(self._fields.vec, result)
+
+    def linearise(self) -> BaseMatrix:
+        """Its derivative at the present fields."""
+        with _symbolic():
+            self.linearised.AssembleLinearization(self._fields.vec)
+        return self.linearised.mat
+
+    @cached_property
+    def _applied(self) -> BilinearForm:
+        return self._made(lambda body, where: body.residual * self._dx(where))
+
+    @cached_property
+    def linearised(self) -> BilinearForm:
+        """What `linearise` assembles, with the matrices of static condensation."""
+
+        def tangent(body: Body, where: dict[str, BitArray]) -> SumOfIntegrals:
+            integral = body.residual * self._dx(where)
+            integral.linearization = body.tangent * self._dx(where)
+            return integral
+
+        return self._made(tangent, self.condense)
+
+    def _made(self, together: Callable[[Body, dict[str, BitArray]], SumOfIntegrals], condense: bool = False) -> BilinearForm:
+        """A bilinear form of the terms, those over the body `together` but for those that stay apart."""
+        result = BilinearForm(self._discretisation.space, condense=condense)
+        inside = [term for term in self._terms if term.boundary is None]
+        bodies, apart = self._bodies(inside)
+        with _symbolic():
+            for body, where in bodies:
+                result += together(body, where)
+        for term in apart:
+            result += self._over_body(term)
+        for term in inside:
+            if term.lumps:
+                result += self._at_corners(term)
+        for term in self._terms:
+            if term.boundary is not None:
+                result += self._over_boundary(term)
+        return result
+
+    def _bodies(self, terms: Sequence[Term]) -> tuple[list[tuple[Body, dict[str, BitArray]]], list[Term]]:
+        """Terms over the body together, with where they are integrated, and those that stay apart."""
+        apart = [term for term in terms if term.apart]
+        joined = [term for term in terms if not term.apart]
+        try:
+            return self._joined(joined), apart
+        except NotDerivable:
+            derivable = [self._is_derivable(term) for term in joined]
+        apart += [term for term, yes in zip(joined, derivable, strict=True) if not yes]
+        return self._joined([term for term, yes in zip(joined, derivable, strict=True) if yes]), apart
+
+    def _is_derivable(self, term: Term) -> bool:
+        try:
+            self._joined([term])
+        except NotDerivable:
+            return False
+        return True
+
+    def _joined(self, terms: Sequence[Term]) -> list[tuple[Body, dict[str, BitArray]]]:
+        """All terms where contents are integrals, those that do not lump where contents are lumped."""
+        storage = self._discretisation.storage
+        steady = [term for term in terms if not term.lumps]
+        parts: list[tuple[Sequence[Term], dict[str, BitArray]]] = [(terms, {})]
+        if len(steady) < len(terms):
+            parts = [(terms, {"definedonelements": storage.integrated}), (steady, {"definedonelements": storage.lumped})]
+        return [(Body(self._unknowns, some, self._weight, self._rates), where) for some, where in parts if some]
+
+    def _dx(self, where: dict[str, BitArray]) -> Any:
+        return dx(intrules=self._discretisation.rules, **where)
+
+    @property
+    def _weight(self) -> Any:
+        return self._discretisation.kinematics.weight
+
+    def _over_body(self, term: Term) -> Any:
+        where = {"definedonelements": self._discretisation.storage.integrated} if term.lumps else {}
+        integral = self._integrand(term, self._weight) * self._dx(where)
+        return Variation(integral) if term.kind is Kind.ENERGY else integral
+
+    def _over_boundary(self, term: Term) -> SumOfIntegrals:
+        mesh = self._discretisation.mesh
+        region = mesh.Boundaries(term.boundary)
+        # At the ends of a 1-d mesh NGSolve's normal points outwards as seen from the cell only.
+        in_cells = term.normal_derivatives or (mesh.dim == 1 and term.role is Role.LOAD)
+        integrand = self._integrand(term, self._weight)
+        return integrand * ds(definedon=region, bonus_intorder=BONUS_ORDER, skeleton=in_cells)
+
+    def _at_corners(self, term: Term) -> SumOfIntegrals:
+        """A content that is lumped: at a corner no other function than that of its vertex is there."""
+        storage = self._discretisation.storage
+        integrand = self._integrand(term, storage.vertex_weights)
+        return integrand * dx(intrules=VERTEX_RULES, definedonelements=storage.lumped)
+
+    def _integrand(self, term: Term, weight: Any) -> Any:
+        weighted = weight * term.integrand
+        if term.kind is Kind.RATE and self._rates is not None:
+            weighted = self._rates * weighted
+        return weighted.Compile()
 
 
-def form(discretisation: Discretisation, terms: list[Term], rates: Any = None, condense: bool = False) -> BilinearForm:
-    """The sum of terms; those of kind RATE with the factor `rates`, such as 1/Δt."""
-    result = BilinearForm(discretisation.space, condense=condense)
-    for term in terms:
-        if term.lumps:
-            for part in content_integrals(discretisation, term, rates):
-                result += part
-        else:
-            result += integral(discretisation, term, rates if term.kind is Kind.RATE else None)
-    return result
+@contextmanager
+def _symbolic() -> Iterator[None]:
+    """Within it, bilinear integrals are made and assembled by their coefficients; both have to be."""
+    before = ngsglobals.symbolic_integrator_uses_diff
+    ngsglobals.symbolic_integrator_uses_diff = True
+    try:
+        yield
+    finally:
+        ngsglobals.symbolic_integrator_uses_diff = before

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cached_property
+from typing import Any
 
 import numpy as np
-from ngsolve import CF, BaseMatrix, BaseVector, BilinearForm, CoefficientFunction, GridFunction, Parameter
+from ngsolve import CF, BaseMatrix, BaseVector, CoefficientFunction, GridFunction, Parameter
 from numpy.typing import NDArray
 
 from ngswell.baths.treatment import Charge
@@ -16,9 +17,10 @@ from ngswell.models.one_number import Functions
 from ngswell.models.term import Kind, Term
 from ngswell.problem.admissible import Admissible
 from ngswell.problem.baths import Baths
+from ngswell.problem.body import Unknowns
 from ngswell.problem.bounded import set_bounded
 from ngswell.problem.discretisation import Discretisation
-from ngswell.problem.forms import form
+from ngswell.problem.forms import Form
 from ngswell.problem.prescribed import PrescribedValues
 from ngswell.schedules import Clock
 from ngswell.setup.loads import followed
@@ -47,6 +49,7 @@ class Problem(Discretisation):
         self._charge = Parameter(setup.charge.at(setup.start))
         own = len(self.model.unknowns)  # the rest are multipliers and numbers
         trials, tests = (list(functions) for functions in self.space.TnT())
+        self._unknowns = Unknowns(trials, tests, self.fields)
         numbers = {
             name: Functions(trials[at], tests[at], self.fields.components[at])
             for at, name in enumerate(self.names)
@@ -55,9 +58,8 @@ class Problem(Discretisation):
         baths = Baths(self, numbers, self.clock, held)
         self.baths = baths.present
         """The baths at the clock's time, by boundary."""
-        first = next(iter(self.baths.values()), None)
         weight = None if setup.fluid_weight is None else followed(setup.fluid_weight, self.clock)
-        context = FieldContext(setup.material, self.kinematics, self._charge, weight, first)
+        context = FieldContext(setup.material, self.kinematics, self._charge, weight, next(iter(self.baths.values()), None))
         trial_state = self.model.state(trials[:own], context)
         self.state = self.model.state(self.fields.components[:own], context)
         tested = {balance: tests[self.names.index(unknown)] for balance, unknown in self.model.balanced.items()}
@@ -70,9 +72,13 @@ class Problem(Discretisation):
         ]
         self.admissible = Admissible(self, self.state, self.fields)
         self._prescribed = PrescribedValues(self, self.fields, self.baths)
-        self._system = form(self, self.terms, 1 / self.dt)
-        self._contents = form(self, [term for term in self.terms if term.kind is Kind.RATE])
+        self._system = self.form(self.terms, 1 / self.dt)
+        self._contents = self.form([term for term in self.terms if term.kind is Kind.RATE])
         self._old_contents, self._work = (self.fields.vec.CreateVector() for _ in range(2))
+
+    def form(self, terms: Sequence[Term], rates: Any = None, condense: bool = False) -> Form:
+        """`terms` as a form of the fields."""
+        return Form(self, self._unknowns, terms, rates, condense)
 
     # -- clock and states ----------------------------------------------------------------------------------------------
 
@@ -206,15 +212,14 @@ class Problem(Discretisation):
 
         Where a force moves a side as one, the sum of the reactions and less the force is what has to vanish.
         """
-        self._system.Apply(self.fields.vec, result)
+        self._system.apply(result)
         result.data -= (1 / self.dt.Get()) * self._old_contents
         for tie in self.ties:
             result[int(tie.dofs[0])] -= tie.force.at(self.time)
 
     def linearise(self) -> BaseMatrix:
         """dr/dx at the present fields, on all degrees of freedom."""
-        self._system.AssembleLinearization(self.fields.vec)
-        return self._system.mat
+        return self._system.linearise()
 
     @property
     def reaches_inside(self) -> bool:
@@ -227,19 +232,19 @@ class Problem(Discretisation):
         return any(term.kinked for term in self.terms)
 
     @cached_property
-    def condensed(self) -> BilinearForm | None:
+    def condensed(self) -> Form | None:
         """The system without the unknowns inside cells, to be assembled like `linearise`; None where it gains nothing."""
         inside = sum(self.space.FreeDofs()) - sum(self.space.FreeDofs(True))
         if not inside or self.reaches_inside:
             return None
-        return form(self, self.terms, 1 / self.dt, condense=True)
+        return self.form(self.terms, 1 / self.dt, condense=True)
 
     def contents(self, result: BaseVector) -> None:
         """S at the present fields: its sum over the vertex functions of p or c is the fluid or the salt held."""
-        self._contents.Apply(self.fields.vec, result)
+        self._contents.apply(result)
 
     def outflow(self, result: BaseVector) -> None:
         """R at the present fields and time, which the contents fall by in unit time, on all degrees of freedom."""
-        self._system.Apply(self.fields.vec, result)
-        self._contents.Apply(self.fields.vec, self._work)
+        self._system.apply(result)
+        self._contents.apply(self._work)
         result.data -= (1 / self.dt.Get()) * self._work

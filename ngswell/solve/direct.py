@@ -12,6 +12,7 @@ from ngsolve import BaseMatrix, BaseVector, BilinearForm, BitArray
 from numpy.typing import NDArray
 
 from ngswell.problem.discretisation import Tie
+from ngswell.problem.forms import Form
 from ngswell.problem.problem import Problem
 from ngswell.solve.pardiso import Pardiso, library
 
@@ -186,23 +187,22 @@ class CondensedSolver(LinearSolver):
     The factorisation is of their Schur complement: A_bb − A_bi A_ii⁻¹ A_ib.
     """
 
-    def __init__(self, form: BilinearForm, free: BitArray, name: str | None = None) -> None:
-        super().__init__(free & form.space.FreeDofs(True), name)
-        self._form = form
+    def __init__(self, form: Form, free: BitArray, name: str | None = None) -> None:
+        super().__init__(free & form.linearised.space.FreeDofs(True), name)
+        self._form, self._condensed = form, form.linearised
         self._reduced: BaseVector | None = None
 
     def linearise(self, problem: Problem) -> BaseMatrix:
-        self._form.AssembleLinearization(problem.fields.vec)
-        return self._form.mat
+        return self._form.linearise()
 
     def solve(self, right: BaseVector, solution: BaseVector, prescribed: BaseVector | None = None) -> bool:
         if self._reduced is None:
             self._reduced = right.CreateVector()
         self._reduced.data = right
-        self._reduced.data += self._form.harmonic_extension_trans * right
+        self._reduced.data += self._condensed.harmonic_extension_trans * right
         solved = super().solve(self._reduced, solution, prescribed)
-        solution.data += self._form.inner_solve * right
-        solution.data += self._form.harmonic_extension * solution
+        solution.data += self._condensed.inner_solve * right
+        solution.data += self._condensed.harmonic_extension * solution
         return solved and bool(np.isfinite(solution.FV().NumPy()).all())
 
 

@@ -5,7 +5,6 @@ from ngsolve import L2, LinearForm, ds, x
 
 from ngswell import Confined, Penalty, PlaneStrain, Roller, Spatial, box, column, rectangle
 from ngswell.baths.treatment import normal_size
-from ngswell.problem.forms import form
 from tests.scenes import confined_column, strip
 
 
@@ -17,7 +16,7 @@ def test_efflux_is_per_current_area():
     problem.vector[problem.ranges["p"]] += 0.01
     efflux = next(t for t in problem.terms if (t.balance, t.name) == ("fluid", "efflux"))
     vector = problem.fields.vec.CreateVector()
-    form(problem, [efflux]).Apply(problem.fields.vec, vector)
+    problem.form([efflux]).apply(vector)
     total = vector.FV().NumPy()[problem.ranges["p"]].sum()
     assert total == pytest.approx(0.01 * 0.02 * 1.2, rel=1e-12)
 
@@ -32,7 +31,7 @@ def test_relative_penalty_is_a_multiple_of_K_over_h(treatment, h):
         problem.vector[problem.ranges["p"]] += 0.01
         efflux = next(t for t in problem.terms if (t.balance, t.name) == ("fluid", "efflux"))
         vector = problem.fields.vec.CreateVector()
-        form(problem, [efflux]).Apply(problem.fields.vec, vector)
+        problem.form([efflux]).apply(vector)
         results.append(vector.FV().NumPy().sum())
     assert results[0] == pytest.approx(results[1], rel=1e-12)
 

@@ -32,7 +32,6 @@ from ngswell import (
     rectangle,
 )
 from ngswell.models.term import Kind
-from ngswell.problem.forms import form
 from tests.scenes import block, deformed, strip
 
 
@@ -134,7 +133,7 @@ def check_terms(problem):
     problem.residual(total)
     summed = np.zeros(total.size)
     for term in problem.terms:
-        form(problem, [term]).Apply(problem.fields.vec, part)
+        problem.form([term]).apply(part)
         assert np.abs(part.FV().NumPy()).max() > 0, f"{term} does nothing"
         summed += part.FV().NumPy() / (0.7 if term.kind is Kind.RATE else 1.0)
     assert summed == pytest.approx(total.FV().NumPy(), abs=1e-13)
