@@ -95,7 +95,8 @@ def _integrand(unknowns: Unknowns, term: Term, weight: Any, rates: Any) -> Coeff
     weighted = weight * term.integrand
     if term.kind is Kind.ENERGY:
         operators = (_operator(function, unknowns.trials) for function in (weighted * dx).GetProxies(True))
-        return _sum([weighted.Diff(operator.function, operator.on(unknowns.tests)) for operator in operators])
+        # Not along the test function: Diff would then take the gradients of an unknown for functions of it as well.
+        return _sum([_dot(_flat(weighted.Diff(o.function)), o.on(unknowns.tests)) for o in operators])
     return rates * weighted if term.kind is Kind.RATE and rates is not None else weighted
 
 
