@@ -20,6 +20,7 @@ from ngswell.baths.treatment import Prescribed, Weak
 from ngswell.baths.vessel import Vessel
 from ngswell.calls import refusing
 from ngswell.errors import (
+    CompilerWarning,
     ExtrapolationWarning,
     InputError,
     InstabilityError,
@@ -82,18 +83,19 @@ from ngswell.units import MPa, day, hour, kPa, metre, micrometre, year
 from ngswell.version import __version__ as __version__
 
 __all__ = [
-    "BACKWARD_EULER", "CSV", "ESDIRK4", "TABLE_1", "TABLE_2", "VTK", "Adaptive", "Area", "Averaged", "Axisymmetric", "Bath",
-    "Blend", "Call", "Checkpoint", "Coarseness", "Concentration", "Confined", "Cylindrical", "DampedNewton", "Efflux",
-    "Essential", "ExtrapolationWarning", "FibreDistribution", "FibreReinforced", "Fibres", "Fixed", "Frozen", "HolmesMow",
-    "HolmesMowSolid", "InnerLayer", "InputError", "InstabilityError", "InstabilityWarning", "Integral", "Lagged",
-    "LeastSquares", "Ledger", "Load", "LocalDonnan", "LogNeoHookean", "MPa", "MackieMeares", "Material", "MooneyRivlin",
-    "Multiplier", "NeoHookean", "NgswellError", "Nitsche", "Observer", "Obstacle", "Orthotropic", "Outflow", "OutputError",
-    "OverlapWarning", "Penalty", "Pin", "PlaneStrain", "Platen", "Potential", "PowerLaw", "Prescribed", "Pressure", "Probe",
-    "Problem", "Progress", "Ramp", "Reaction", "Reason", "Restart", "Result", "RigidCylinder", "RigidPlane", "RigidSphere",
-    "Role", "Roller", "Scene", "Setup", "Sine", "Snapshot", "Snapshots", "Spatial", "Spherical", "Spline", "Stability",
-    "StepError", "Support", "Symmetry", "Term", "Traction", "TransverselyIsotropic", "TwoLevelSolver", "Uncharged",
-    "UnitsWarning", "Vessel", "Weak", "Weight", "box", "by_region", "check_mesh", "column", "day", "from_occ", "hour",
-    "kPa", "metre", "micrometre", "ray", "read_checkpoint", "read_mesh", "rectangle", "year",
+    "BACKWARD_EULER", "CSV", "ESDIRK4", "TABLE_1", "TABLE_2", "VTK", "Adaptive", "Area", "Averaged", "Axisymmetric",
+    "Bath", "Blend", "Call", "Checkpoint", "Coarseness", "CompilerWarning", "Concentration", "Confined", "Cylindrical",
+    "DampedNewton", "Efflux", "Essential", "ExtrapolationWarning", "FibreDistribution", "FibreReinforced", "Fibres",
+    "Fixed", "Frozen", "HolmesMow", "HolmesMowSolid", "InnerLayer", "InputError", "InstabilityError",
+    "InstabilityWarning", "Integral", "Lagged", "LeastSquares", "Ledger", "Load", "LocalDonnan", "LogNeoHookean", "MPa",
+    "MackieMeares", "Material", "MooneyRivlin", "Multiplier", "NeoHookean", "NgswellError", "Nitsche", "Observer",
+    "Obstacle", "Orthotropic", "Outflow", "OutputError", "OverlapWarning", "Penalty", "Pin", "PlaneStrain", "Platen",
+    "Potential", "PowerLaw", "Prescribed", "Pressure", "Probe", "Problem", "Progress", "Ramp", "Reaction", "Reason",
+    "Restart", "Result", "RigidCylinder", "RigidPlane", "RigidSphere", "Role", "Roller", "Scene", "Setup", "Sine",
+    "Snapshot", "Snapshots", "Spatial", "Spherical", "Spline", "Stability", "StepError", "Support", "Symmetry", "Term",
+    "Traction", "TransverselyIsotropic", "TwoLevelSolver", "Uncharged", "UnitsWarning", "Vessel", "Weak", "Weight",
+    "box", "by_region", "check_mesh", "column", "day", "from_occ", "hour", "kPa", "metre", "micrometre", "ray",
+    "read_checkpoint", "read_mesh", "rectangle", "year",
 ]  # fmt: skip
 
 for _name in __all__:

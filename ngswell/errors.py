@@ -32,6 +32,10 @@ class UnitsWarning(UserWarning):
     """Numbers of a scene, each possible, hardly belong together: one of them may be in other units."""
 
 
+class CompilerWarning(UserWarning):
+    """Terms were to be compiled to C++, and are not: no compiler is there, or it fails."""
+
+
 class InstabilityWarning(UserWarning):
     """A run or a state of rest is past the limit of stability: perturbations grow that the numbers do not show."""
 

@@ -15,6 +15,7 @@ from ngswell.baths.bath import Bath
 from ngswell.errors import InputError
 from ngswell.observers.base import Observer
 from ngswell.observers.records import power_of_mm, product
+from ngswell.problem.compiling import why_not
 from ngswell.problem.discretisation import Discretisation
 from ngswell.problem.handed_on import handed_on
 from ngswell.problem.problem import Problem
@@ -125,6 +126,9 @@ class Scene(Setup):
             lines.append(f"  {type(one.support).__name__} on {one.boundary}: {how} along {one.direction}")
         lines += [f"  {name}: {law}" for name, law in self.material.laws().items()]
         lines.append(f"  threads: {threads_said(problem)}")
+        if self.compiled:
+            missing = why_not()
+            lines.append("  terms: " + ("compiled to C++" if missing is None else f"bytecode ({missing})"))
         lines += [f"  limit: {limit}" for limit in limits(self)]
         return "\n".join(lines)
 

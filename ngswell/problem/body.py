@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import groupby
 from typing import Any, NamedTuple
 
 from netgen.meshing import NgException
 from ngsolve import CF, CacheCF, CoefficientFunction, GridFunction, InnerProduct, dx, grad
 
 from ngswell.models.term import Kind, Term
+from ngswell.problem.compiling import Compile
 
 
 class NotDerivable(Exception):
@@ -28,10 +30,10 @@ class Body:
 
     With W_l the operators on trial functions (Grad u, p, grad p, ...) and T_k those on test functions they are
 
-        residual Σ_k R_k(W) · T_k,    tangent Σ_kl T_k · D_kl W_l,   D_kl = ∂R_k/∂W_l at the fields.
+        residual Σ_k R_k · T_k,    tangent Σ_kl T_k · D_kl W_l,   D_kl = ∂R_k/∂W_l.
 
-    Each R_k is compiled as a whole, and all D_kl together: they are evaluated once a cell. By itself a form evaluates
-    the whole integrand for each component of a test function and, for the tangent, of a trial function.
+    All R_k are compiled together, and all D_kl, and evaluated once a cell, at the fields. By itself a form evaluates the
+    whole integrand for each component of a test function and, for the tangent, of a trial function.
 
     Raises NotDerivable.
     """
@@ -40,53 +42,65 @@ class Body:
         try:
             total = _sum([_integrand(unknowns, term, weight, rates) for term in terms])
             total, tests = _unified(total, unknowns.tests, trial=False)
+            if not tests:
+                raise NotDerivable("the terms are zero")
             total, trials = _unified(total, unknowns.trials, trial=True)
             self._tests, self._trials = ([operator.function for operator in operators] for operators in (tests, trials))
             self._rows = [_flat(total.Diff(test)) for test in self._tests]
             # Powers of a GridFunction cannot be differentiated by it, those of a multiple can.
             at = [(1.0 * operator.on(unknowns.fields.components)).MakeVariable() for operator in trials]
             at_fields = total.Replace(dict(zip(self._trials, at, strict=True)))
-            rows = CF(tuple(_flat(at_fields.Diff(test)) for test in self._tests))
-            self._columns = [rows.Diff(variable).Reshape((rows.dim, variable.dim)) for variable in at]
+            self._values = CF(tuple(_flat(at_fields.Diff(test)) for test in self._tests))
+            self._columns = [self._values.Diff(variable).Reshape((self._values.dim, variable.dim)) for variable in at]
         except NgException as refused:
             raise NotDerivable(str(refused)) from refused
 
     @property
-    def residual(self) -> CoefficientFunction:
-        """Σ R_k(W) · T_k."""
-        return _sum([_dot(row.Compile().Freeze(), test) for row, test in zip(self._rows, self._tests, strict=True)])
+    def varies(self) -> bool:
+        """Whether the residual depends on the fields at all."""
+        return bool(self._trials)
 
-    @property
-    def tangent(self) -> CoefficientFunction:
+    def residual(self, compile: Compile) -> CoefficientFunction:
+        """Σ R_k · T_k."""
+        values, start, parts = CacheCF(compile(self._values)).Freeze(), 0, []
+        for test in self._tests:
+            parts.append(_dot(_part(values, start, test.dim), test))
+            start += test.dim
+        return _sum(parts)
+
+    def tangent(self, compile: Compile) -> CoefficientFunction:
         """Σ T_k · D_kl W_l."""
-        blocks, start = {}, 0
-        for k, row in enumerate(self._rows):
+        blocks, start = [], 0
+        for test, row in zip(self._tests, self._rows, strict=True):
             present = {id(trial) for trial in (InnerProduct(row, row) * dx).GetProxies(True)}
-            for col, (trial, column) in enumerate(zip(self._trials, self._columns, strict=True)):
-                if id(trial) in present:
-                    blocks[k, col] = column[start : start + row.dim, 0 : trial.dim]
-            start += row.dim
-        return _bilinear(blocks, self._tests, self._trials)
+            mine = [pair for pair in zip(self._trials, self._columns, strict=True) if id(pair[0]) in present]
+            blocks += [(test, trial, column[start : start + test.dim, 0 : trial.dim]) for trial, column in mine]
+            start += test.dim
+        values = CacheCF(compile(CF(tuple(_flat(block) for _, _, block in blocks))))
+        parts, start = [], 0
+        for of_test in (list(group) for _, group in groupby(blocks, lambda block: id(block[0]))):
+            size = sum(block.dim for _, _, block in of_test)
+            parts.append(_row(CacheCF(_part(values, start, size)).Freeze(), of_test))
+            start += size
+        return _sum(parts)
 
 
-def _bilinear(
-    blocks: dict[tuple[int, int], CoefficientFunction],
-    tests: Sequence[CoefficientFunction],
-    trials: Sequence[CoefficientFunction],
-) -> CoefficientFunction:
-    """Σ T_k · D_kl W_l, all blocks D_kl compiled together and evaluated once a cell."""
-    values = CacheCF(CF(tuple(_flat(block) for block in blocks.values())).Compile()).Freeze()
+Block = tuple[CoefficientFunction, CoefficientFunction, CoefficientFunction]
+"""An operator on a test and one on a trial function, and the derivative that goes with them."""
+
+
+def _row(values: CoefficientFunction, blocks: Sequence[Block]) -> CoefficientFunction:
+    """Σ_l T · D_l W_l; `values` are the components of all D_l, one after the other."""
     parts, start = [], 0
-    for k, col in blocks:
-        rows, columns = tests[k].dim, trials[col].dim
-        mine = values[start : start + rows * columns]
-        start += rows * columns
-        if rows == 1:
-            parts.append(_dot(mine, trials[col]) * tests[k])
-        elif columns == 1:
-            parts.append(_dot(mine, tests[k]) * trials[col])
+    for test, trial, block in blocks:
+        mine = _part(values, start, block.dim)
+        start += block.dim
+        if test.dim == 1:
+            parts.append(_dot(mine, trial) * _scalar(test))
+        elif trial.dim == 1:
+            parts.append(_dot(mine, test) * _scalar(trial))
         else:
-            parts.append(InnerProduct(mine.Reshape((rows, columns)) * _flat(trials[col]), _flat(tests[k])))
+            parts.append(InnerProduct(mine.Reshape((test.dim, trial.dim)) * _flat(trial), _flat(test)))
     return _sum(parts)
 
 
@@ -137,7 +151,20 @@ def _unified(
 
 
 def _dot(values: CoefficientFunction, operator: CoefficientFunction) -> CoefficientFunction:
-    return InnerProduct(values, _flat(operator)) if operator.dim > 1 else values[0] * operator
+    if operator.dim == 1:
+        return _scalar(values) * _scalar(operator)
+    return InnerProduct(values, _flat(operator))
+
+
+def _part(values: CoefficientFunction, start: int, size: int) -> CoefficientFunction:
+    """Components of a vector; a scalar where it is one."""
+    return _scalar(values) if values.dim == 1 else values[start] if size == 1 else values[start : start + size]
+
+
+def _scalar(function: CoefficientFunction) -> CoefficientFunction:
+    """A function of one component without dimensions."""
+    dims = len(function.dims)
+    return function[(0,) * dims] if dims > 1 else function[0] if dims == 1 else function
 
 
 def _flat(function: CoefficientFunction) -> CoefficientFunction:

@@ -12,6 +12,7 @@ from ngsolve.comp import SumOfIntegrals
 
 from ngswell.models.term import Kind, Role, Term
 from ngswell.problem.body import Body, NotDerivable, Unknowns
+from ngswell.problem.compiling import Compile, bytecode, cpp
 from ngswell.problem.discretisation import BONUS_ORDER, Discretisation
 from ngswell.problem.lumping import VERTEX_RULES
 
@@ -47,15 +48,16 @@ class Form:
 
     @cached_property
     def _applied(self) -> BilinearForm:
-        return self._made(lambda body, where: body.residual * self._dx(where))
+        return self._made(lambda body, where: body.residual(self._compile(where)) * self._dx(where))
 
     @cached_property
     def linearised(self) -> BilinearForm:
         """What `linearise` assembles, with the matrices of static condensation."""
 
         def tangent(body: Body, where: dict[str, BitArray]) -> SumOfIntegrals:
-            integral = body.residual * self._dx(where)
-            integral.linearization = body.tangent * self._dx(where)
+            integral = body.residual(bytecode) * self._dx(where)  # never evaluated
+            if body.varies:
+                integral.linearization = body.tangent(self._compile(where)) * self._dx(where)
             return integral
 
         return self._made(tangent, self.condense)
@@ -104,6 +106,11 @@ class Form:
         if len(steady) < len(terms):
             parts = [(terms, {"definedonelements": storage.integrated}), (steady, {"definedonelements": storage.lumped})]
         return [(Body(self._unknowns, some, self._weight, self._rates), where) for some, where in parts if some]
+
+    def _compile(self, where: dict[str, BitArray]) -> Compile:
+        """How to compile what is evaluated over all cells; where contents are lumped it is bytecode, for a few steps."""
+        seldom = where.get("definedonelements") is self._discretisation.storage.lumped
+        return cpp if self._discretisation.setup.compiled and not seldom else bytecode
 
     def _dx(self, where: dict[str, BitArray]) -> Any:
         return dx(intrules=self._discretisation.rules, **where)

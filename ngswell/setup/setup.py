@@ -24,15 +24,13 @@ from ngswell.models.potential import Potential
 from ngswell.physics.kinematics import Kinematics
 from ngswell.physics.material import Material
 from ngswell.schedules import LARGEST, Ramp, Schedule
+from ngswell.setup.charge import check_jumps
 from ngswell.setup.displacements import Held, by_direction, check_displacements, held
 from ngswell.setup.loads import Load
 from ngswell.setup.rigid_motions import check_determined
 from ngswell.setup.snapshot import Snapshot
 from ngswell.setup.supports import Support
 from ngswell.setup.units import check_units
-
-SMALL_JUMP = 0.1
-"""Jump of cfc0, as a share of its largest value, below which `Concentration` is off by less than 1e-4."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,8 +39,8 @@ class Setup:
 
     The body starts undeformed, in Donnan equilibrium with `initial` (salt concentration [mol/l] and hydraulic
     pressure [N/mm²]; by default that of its baths at `start`, which then have to agree). `charge` multiplies the
-    material's cfc0 over time. With an `origin`, which `Scene.after` sets, runs start from its fields instead. Raises
-    InputError for anything that cannot be meant.
+    material's cfc0 over time. With an `origin`, which `Scene.after` sets, runs start from its fields instead. `compiled`
+    has the terms over the body compiled to C++ (docs/speed.md). Raises InputError for anything that cannot be meant.
     """
 
     mesh: Mesh
@@ -58,6 +56,7 @@ class Setup:
     mesh_shape: MeshShape = field(init=False, repr=False, compare=False)
     sides: Sides = field(init=False, repr=False, compare=False)
     origin: Snapshot | None = None
+    compiled: bool = False
     _made_with: dict[str, NDArray] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -71,7 +70,7 @@ class Setup:
         check_sides(self.sides)
         self.material.check_on(self.mesh)
         self.model.check(self.material, self.baths)
-        self._check_jumps()
+        check_jumps(self.material, self.model, self.sides)
         for value in self.charge.values:
             if not 0 <= value <= 100:
                 raise InputError(f"charge factor {value!r} is outside 0 … 100; it multiplies cfc0")
@@ -107,6 +106,7 @@ class Setup:
             loads=checks.several("loads", self.loads, Load, "Traction, Pressure, Obstacle, Weight or Efflux"),
             start=checks.number("start", self.start, "s", -LARGEST, LARGEST),
         )
+        checks.flag("compiled", self.compiled)
         if self.origin is not None:
             checks.instance("origin", self.origin, Snapshot, "a snapshot, such as `result.end`")
             if self.origin.time != self.start:
@@ -137,17 +137,6 @@ class Setup:
     def check_surface(self, what: str, boundary: str) -> list[str]:
         """The same, of the surface of the body; InputError for one inside it."""
         return self.sides.of_surface(what, self.check_boundary(what, boundary))
-
-    def _check_jumps(self) -> None:
-        """Refuse a charge that jumps where the model has a continuous field for it: no mesh brings it to the right rest."""
-        charge = self.material.cfc0
-        if self.model.charge_field is None or not isinstance(charge, CoefficientFunction):
-            return
-        if self.sides.jumps(charge, SMALL_JUMP):
-            raise InputError(
-                f"cfc0 jumps from cell to cell, but {type(self.model).__name__} has one continuous field for the charge and "
-                "comes to rest elsewhere on every mesh, by percents: take Potential() or LocalDonnan(), which are exact"
-            )
 
     def _check_baths(self) -> None:
         taken: set[str] = set()

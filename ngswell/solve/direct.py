@@ -8,7 +8,7 @@ from typing import Protocol
 
 import numpy as np
 from netgen.meshing import NgException
-from ngsolve import BaseMatrix, BaseVector, BilinearForm, BitArray
+from ngsolve import BaseMatrix, BaseVector, BitArray
 from numpy.typing import NDArray
 
 from ngswell.problem.discretisation import Tie
