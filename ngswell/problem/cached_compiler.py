@@ -33,8 +33,8 @@ def main(folder: str, tag: str, compiler: str, *flags: str) -> int:
         text = ADDRESS.sub(lambda found: str(int(found[0]) - first), text)
         with open(source, "w", encoding="utf-8") as file:
             file.write(text)
-    if "reinterpret_cast<void *>(0x" in text:  # addresses of this run
-        return subprocess.call([compiler, *flags])
+    if "#include" not in text:  # addresses of this run
+        return subprocess.call(["c++", "-fPIC", "-O1", *flags])
     with open(compiler, "rb") as file:
         key = hashlib.sha256("\n".join([tag, text]).encode() + file.read()).hexdigest()
     kept = os.path.join(folder, key + ".o")

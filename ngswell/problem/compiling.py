@@ -8,12 +8,12 @@ import shutil
 import sys
 import sysconfig
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
 from netgen.meshing import NgException
-from ngsolve import CoefficientFunction, __version__
+from ngsolve import CoefficientFunction, __version__, config
 
 from ngswell.calls import warn
 from ngswell.errors import CompilerWarning
@@ -69,9 +69,9 @@ def _in_front_of_compiler() -> Iterator[None]:
     compiler = shutil.which("ngscxx", path=path) or ""
     call = [sys.executable, "-I", "-S", cached_compiler.__file__, str(folder()), __version__, compiler]
     with tempfile.TemporaryDirectory() as front:
-        script = Path(front) / "ngscxx"
-        script.write_text(f'#!/bin/sh\nexec {shlex.join(call)} "$@"\n')
-        script.chmod(0o755)
+        _program(front, "ngscxx", call)
+        if sys.platform == "linux":  # as NGSolve's, which asks a Python process for the libraries each time
+            _program(front, "ngsld", ["c++", *shlex.split(config.get_link_lib_args())])
         os.environ["PATH"] = os.pathsep.join([front, path])
         try:
             yield
@@ -80,3 +80,10 @@ def _in_front_of_compiler() -> Iterator[None]:
                 del os.environ["PATH"]
             else:
                 os.environ["PATH"] = before
+
+
+def _program(folder: str, name: str, call: Sequence[str]) -> None:
+    """A shell script that makes a `call` with its own arguments added."""
+    script = Path(folder) / name
+    script.write_text(f'#!/bin/sh\nexec {shlex.join(call)} "$@"\n')
+    script.chmod(0o755)

@@ -21,7 +21,8 @@ class Form:
     """The sum of terms as a form of the fields; those of kind RATE with the factor `rates`, such as 1/Δt.
 
     Terms over the body are taken together and differentiated symbolically (`body`), where all of them can be. All others
-    are an integral each, which NGSolve differentiates as it evaluates it.
+    are an integral each, which NGSolve differentiates as it evaluates it. A form that is evaluated `often` is compiled as
+    the setup says.
     """
 
     def __init__(
@@ -31,10 +32,12 @@ class Form:
         terms: Sequence[Term],
         rates: Any = None,
         condense: bool = False,
+        often: bool = False,
     ) -> None:
         self.condense, self._fields = condense, unknowns.fields
         self._discretisation, self._unknowns, self._rates = discretisation, unknowns, rates
         self._terms = terms
+        self._compile = cpp if often and discretisation.setup.compiled else bytecode
 
     def apply(self, result: BaseVector) -> None:
         """The form at the present fields, on all degrees of freedom."""
@@ -48,7 +51,7 @@ class Form:
 
     @cached_property
     def _applied(self) -> BilinearForm:
-        return self._made(lambda body, where: body.residual(self._compile(where)) * self._dx(where))
+        return self._made(lambda body, where: body.residual(self._compiled(where)) * self._dx(where))
 
     @cached_property
     def linearised(self) -> BilinearForm:
@@ -57,7 +60,7 @@ class Form:
         def tangent(body: Body, where: dict[str, BitArray]) -> SumOfIntegrals:
             integral = body.residual(bytecode) * self._dx(where)  # never evaluated
             if body.varies:
-                integral.linearization = body.tangent(self._compile(where)) * self._dx(where)
+                integral.linearization = body.tangent(self._compiled(where)) * self._dx(where)
             return integral
 
         return self._made(tangent, self.condense)
@@ -107,10 +110,9 @@ class Form:
             parts = [(terms, {"definedonelements": storage.integrated}), (steady, {"definedonelements": storage.lumped})]
         return [(Body(self._unknowns, some, self._weight, self._rates), where) for some, where in parts if some]
 
-    def _compile(self, where: dict[str, BitArray]) -> Compile:
+    def _compiled(self, where: dict[str, BitArray]) -> Compile:
         """How to compile what is evaluated over all cells; where contents are lumped it is bytecode, for a few steps."""
-        seldom = where.get("definedonelements") is self._discretisation.storage.lumped
-        return cpp if self._discretisation.setup.compiled and not seldom else bytecode
+        return bytecode if where.get("definedonelements") is self._discretisation.storage.lumped else self._compile
 
     def _dx(self, where: dict[str, BitArray]) -> Any:
         return dx(intrules=self._discretisation.rules, **where)

@@ -72,13 +72,13 @@ class Problem(Discretisation):
         ]
         self.admissible = Admissible(self, self.state, self.fields)
         self._prescribed = PrescribedValues(self, self.fields, self.baths)
-        self._system = self.form(self.terms, 1 / self.dt)
+        self._system = self.form(self.terms, 1 / self.dt, often=True)
         self._contents = self.form([term for term in self.terms if term.kind is Kind.RATE])
         self._old_contents, self._work = (self.fields.vec.CreateVector() for _ in range(2))
 
-    def form(self, terms: Sequence[Term], rates: Any = None, condense: bool = False) -> Form:
-        """`terms` as a form of the fields."""
-        return Form(self, self._unknowns, terms, rates, condense)
+    def form(self, terms: Sequence[Term], rates: Any = None, condense: bool = False, often: bool = False) -> Form:
+        """`terms` as a form of the fields; one that is evaluated `often` is compiled as the setup says."""
+        return Form(self, self._unknowns, terms, rates, condense, often)
 
     # -- clock and states ----------------------------------------------------------------------------------------------
 
@@ -237,7 +237,7 @@ class Problem(Discretisation):
         inside = sum(self.space.FreeDofs()) - sum(self.space.FreeDofs(True))
         if not inside or self.reaches_inside:
             return None
-        return self.form(self.terms, 1 / self.dt, condense=True)
+        return self.form(self.terms, 1 / self.dt, condense=True, often=True)
 
     def contents(self, result: BaseVector) -> None:
         """S at the present fields: its sum over the vertex functions of p or c is the fluid or the salt held."""

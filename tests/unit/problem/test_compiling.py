@@ -19,7 +19,7 @@ def system(scene):
     """The residual of a deformed state, and what the tangent makes of a vector."""
     problem = scene.problem
     deformed(problem)
-    problem.dt.Set(0.7)
+    problem.begin_step(1.0, 0.7)
     residual, moved = problem.fields.vec.CreateVector(), problem.fields.vec.CreateVector()
     problem.residual(residual)
     direction = problem.fields.vec.CreateVector()
@@ -65,7 +65,8 @@ def test_compiled_is_a_flag():
         quarter(compiled="yes")
 
 
-SOURCE = """extern void * compiled_code_pointer{};
+SOURCE = """#include <cmath>
+extern void * compiled_code_pointer{};
 extern void * compiled_code_pointer{};
 double f() {{ return {}; }}
 """
