@@ -102,7 +102,7 @@ NEWTON = 0.03
 """Share of the tolerance that Newton's method leaves."""
 
 MOST_ITERATIONS = 10
-FIRST = 2.0
+FIRST = 8.0
 """Step after a kink [s]; a tenth of it for backward Euler, which has no estimate there."""
 
 

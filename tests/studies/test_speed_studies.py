@@ -13,7 +13,8 @@ from studies.__main__ import main
 from studies.choices import speed_error
 from studies.choices.iteration import PARTS, IterationCost
 from studies.choices.random_runs import errors, random_run
-from studies.choices.speed_error import ComputedBlock, Reference, seconds_at
+from studies.choices.reference import Course, Reference
+from studies.choices.speed_error import seconds_at
 from tests.studies.quick import quick
 
 
@@ -32,9 +33,9 @@ def test_reference_is_cubic_between_kinks():
 
     own = np.concatenate([np.linspace(7000, 7080, 9), np.linspace(7080, 7220, 11)[1:]])
     wanted = np.array([7003.0, 7079.0, 7080.0, 7081.0, 7219.0])
-    reference = Reference(ComputedBlock(own, history(own), None, 0, []))
+    reference = Reference(Course(own, history(own), None))
     assert reference.area(wanted) == pytest.approx(history(wanted), rel=1e-12)
-    across = Reference(ComputedBlock(own, history(own), None, 0, []), kinks=(7000.0, 7220.0))
+    across = Reference(Course(own, history(own), None), kinks=(7000.0, 7220.0))
     assert np.abs(across.area(wanted) - history(wanted)).max() > 1e-3
 
 
@@ -48,7 +49,8 @@ def test_speed_error(tmp_path, monkeypatch):
         assert numbers[f"ratio_to_best_rival_at_{wanted}"] > 0
         assert numbers[f"best_rival_at_{wanted}"].startswith("good_ngsolve")
         assert numbers[f"pressure_ratio_to_best_rival_at_{wanted}"] > 0
-    assert numbers["reference_area_error"] < 1e-3  # tolerances of 1e-4 and 3e-4
+    assert numbers["reference_area_error"] < 1e-5  # what the issue of a reference is: errors of 1e-4 are measured with it
+    assert numbers["reference_pressure_error"] < 1e-4
     assert numbers["penalty_40_area_error"] < 1e-3
     errors = {(row[0], row[1]): float(row[8]) for row in rows[1:]}
     assert errors["potential_order_2_graded", "6 x 6"] < errors["potential_order_2_uniform", "6 x 6"]  # same cells and steps
