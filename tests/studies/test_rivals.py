@@ -76,7 +76,7 @@ def test_graded_lines():
 
 
 def test_the_good_script_computes_the_same_block():
-    """On the same uniform mesh the discrete equations are the same; the errors in time, about the tolerance, differ."""
+    """On the same uniform mesh the discrete equations are the same; the errors in time, below the tolerance, differ."""
     ours = speed_error.compute_ours(speed_error.Way(Potential(2), 4, 1.0, Adaptive(1e-4)), "test")
     theirs = Run(NGSolveBlock(Grid(4, 4, 1.0, 2), bytecode=True), SCHEMES["esdirk4"], 1e-4)
     theirs.go()
@@ -84,9 +84,9 @@ def test_the_good_script_computes_the_same_block():
     areas = dict(zip(found["time"], found["area"], strict=True))
     for time in (7000.0, 7080.0, 8000.0, 11000.0):
         at = np.abs(ours.time - time).argmin()
-        assert areas[time] == pytest.approx(ours.area[at], rel=5e-4)
-    assert np.array(found["pressures"])[0] == pytest.approx(ours.pressures[0], rel=1e-3)
-    assert areas[7000.0] != pytest.approx(areas[7080.0], rel=5e-4)  # the control: areas do change by more
+        assert areas[time] == pytest.approx(ours.area[at], rel=1e-4)
+    assert np.array(found["pressures"])[0] == pytest.approx(ours.pressures[0], rel=1e-4)
+    assert areas[7000.0] != pytest.approx(areas[7080.0], rel=1e-2)  # the control: areas do change by more
 
 
 def test_a_python_without_dolfinx_is_told(capsys):

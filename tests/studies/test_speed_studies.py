@@ -14,7 +14,7 @@ from studies.choices import speed_error
 from studies.choices.iteration import PARTS, IterationCost
 from studies.choices.random_runs import errors, random_run
 from studies.choices.reference import Course, Reference
-from studies.choices.speed_error import seconds_at
+from studies.choices.speed_error import ratio, seconds_at
 from tests.studies.quick import quick
 
 
@@ -24,6 +24,23 @@ def test_seconds_at_an_error():
     assert seconds_at(10**-3.5, errors, seconds) == (pytest.approx(8.0), "measured")  # half way, both logarithmic
     assert seconds_at(1e-5, errors, seconds) == (pytest.approx(64.0), "extrapolated")
     assert seconds_at(1e-1, errors, seconds) == (1.0, "at most")
+
+
+def test_ratio_to_the_fastest_rival():
+    at = {
+        "potential_order_3_graded": {1e-3: (2.0, "measured")},
+        "concentration_order_3_graded": {1e-3: (4.0, "measured")},
+        "paper": {1e-3: (1.0, "measured")},
+        "good_ngsolve_esdirk4_graded": {1e-3: (3.0, "at most")},
+        "dolfinx_euler_uniform": {1e-3: (0.5, "extrapolated")},  # counts only where nothing is measured
+    }
+    found = ratio(1e-3, at, ["good_ngsolve_esdirk4_graded", "dolfinx_euler_uniform"], "")
+    assert found["ratio_to_best_rival_at_1e-3"] == 1.5
+    assert found["best_rival_at_1e-3"] == "good_ngsolve_esdirk4_graded"
+    assert found["best_at_1e-3"] == "potential_order_3_graded"
+    assert found["ratio_at_1e-3_is"] == "rival at most, ours measured"
+    only = ratio(1e-3, at, ["dolfinx_euler_uniform"], "pressure_")
+    assert only["pressure_ratio_to_best_rival_at_1e-3"] == 0.25
 
 
 def test_reference_is_cubic_between_kinks():
