@@ -13,7 +13,8 @@ Tolerance 1e-3, both models with their default baths, one thread. For each MODEL
 models on the same meshes, order and quadrature in DOLFINx with generated C kernels and MUMPS, in a process of their own just
 before ours: `PART_over_rival_MODEL_NX` is our time over theirs, PART one of `tangent`, `residual`, `factorise`, `solve`
 and `full_iteration` (the sum of these four); `rival_MODEL_MESH_PART_ms` theirs. `quadrature_points`,
-`rival_quadrature_points`: in a cell. `dolfinx`: what it is, or that it is absent. All are CPU times.
+`rival_quadrature_points`: in a cell. `dolfinx`: what it is, or that it is absent. All are CPU times. Keys with `compiled_`
+before them are those of scenes with `compiled=True`, which --quick leaves out.
 """
 
 from __future__ import annotations
@@ -58,10 +59,15 @@ class IterationCost:
     seconds: float  # CPU time of the run
     points: int  # of the quadrature in a cell
     rival: dict[str, float] | None  # DOLFINx's
+    compiled: bool = False  # terms in C++
+
+    @property
+    def prefix(self) -> str:
+        return "compiled_" if self.compiled else ""
 
     @property
     def label(self) -> str:
-        return f"{self.model}_{self.mesh}"
+        return f"{self.prefix}{self.model}_{self.mesh}"
 
     def found(self) -> dict[str, float]:
         """Its numbers."""
@@ -78,13 +84,13 @@ class IterationCost:
     def compared(self) -> dict[str, float | int]:
         """How it stands to its factorisations and solves, and to the rival."""
         case = f"{self.model}_{self.mesh.split('x')[0]}"
-        found: dict[str, float | int] = {f"loop_over_linear_algebra_{case}_1_thread": self.found()["overhead"]}
+        found: dict[str, float | int] = {f"{self.prefix}loop_over_linear_algebra_{case}_1_thread": self.found()["overhead"]}
         if self.rival:
             theirs = {part: self.rival[f"{part}_ms"] for part in RIVAL_PARTS}
-            found |= {f"rival_{self.label}_{part}_ms": theirs[part] for part in RIVAL_PARTS}
-            found |= {f"{part}_over_rival_{case}": self.parts[part] / theirs[part] for part in RIVAL_PARTS}
+            found |= {f"rival_{self.model}_{self.mesh}_{part}_ms": theirs[part] for part in RIVAL_PARTS}
+            found |= {f"{self.prefix}{part}_over_rival_{case}": self.parts[part] / theirs[part] for part in RIVAL_PARTS}
             both = (sum(times[part] for part in RIVAL_PARTS) for times in (self.parts, theirs))
-            found[f"full_iteration_over_rival_{case}"] = next(both) / next(both)
+            found[f"{self.prefix}full_iteration_over_rival_{case}"] = next(both) / next(both)
             found["rival_quadrature_points"] = int(self.rival["points"])
         return found
 
@@ -98,7 +104,7 @@ def run(quick: bool = False, dolfinx: str | None = None) -> Findings:
     """Both models, two meshes."""
     meshes, turns = (QUICK_MESHES, 3) if quick else (MESHES, 7)
     there = usable(dolfinx)
-    costs = compute(meshes, turns, dolfinx if there else None)
+    costs = compute(meshes, turns, dolfinx if there else None, (False,) if quick else (False, True))
     numbers: dict[str, float | int | str] = {f"{c.label}_{key}": value for c in costs for key, value in c.found().items()}
     for each in costs:
         numbers |= each.compared()
@@ -112,7 +118,9 @@ def run(quick: bool = False, dolfinx: str | None = None) -> Findings:
     return Findings(draw(costs, list(meshes.values())), header, rows, numbers)
 
 
-def compute(meshes: dict[str, tuple[int, int]], turns: int, dolfinx: str | None = None) -> list[IterationCost]:
+def compute(
+    meshes: dict[str, tuple[int, int]], turns: int, dolfinx: str | None, compiled: Sequence[bool]
+) -> list[IterationCost]:
     """Every model on every mesh, on one thread; the rival's kernels by the python `dolfinx`."""
     threads_before = ngsglobals.numthreads
     SetNumThreads(1)
@@ -120,23 +128,25 @@ def compute(meshes: dict[str, tuple[int, int]], turns: int, dolfinx: str | None 
         costs = []
         for mesh, cells in meshes.items():
             rivals = kernels(dolfinx, cells) if dolfinx else {}
-            costs += [measure(mesh, cells, model, turns, rivals.get(model)) for model in MODELS]
+            costs += [measure(mesh, cells, model, turns, rivals.get(model), cpp) for cpp in compiled for model in MODELS]
         return costs
     finally:
         SetNumThreads(threads_before)
 
 
 def measure(
-    mesh: str, cells: tuple[int, int], model: str, turns: int, rival: dict[str, float] | None = None
+    mesh: str, cells: tuple[int, int], model: str, turns: int, rival: dict[str, float] | None = None, compiled: bool = False
 ) -> IterationCost:
     """One run from rest, and the parts of an iteration at its end."""
-    scene = with_model(free_swelling_block(*cells), MODELS[model])
+    scene = with_model(free_swelling_block(*cells, compiled=compiled), MODELS[model])
     rest = scene.equilibrate(INITIAL)
     clock = process_time()
     result = scene.run(UNTIL, Adaptive(1e-3), [Progress(f"iteration {model}_{mesh}")], resume=rest)
     seconds = process_time() - clock
     points = len(scene.problem.points) // scene.mesh.ne
-    return IterationCost(mesh, model, alone(scene, result, turns), result.end.values.size, result, seconds, points, rival)
+    return IterationCost(
+        mesh, model, alone(scene, result, turns), result.end.values.size, result, seconds, points, rival, compiled
+    )
 
 
 def alone(scene: Scene, result: Result, turns: int) -> dict[str, float]:
@@ -182,8 +192,8 @@ def draw(costs: Sequence[IterationCost], cells: Sequence[tuple[int, int]]) -> Fi
             ax.bar(range(len(mine)), heights, 0.5, bottom, color=shade, hatch=hatch, edgecolor="k", lw=0.4, label=part)
             bottom = [low + height for low, height in zip(bottom, heights, strict=True)]
         ax.plot(range(len(mine)), [c.found()["iteration_ms"] for c in mine], "kD", mfc="w", label="mean of the run")
-        ax.set_xticks(range(len(mine)), [c.model.capitalize() for c in mine])
-        ax.set(title=f"{nx} × {ny} cells", ylabel="time of an iteration [ms]", xlim=(-0.6, 1.6))
+        ax.set_xticks(range(len(mine)), [c.model.capitalize() + ", C++" * c.compiled for c in mine], fontsize=7)
+        ax.set(title=f"{nx} × {ny} cells", ylabel="time of an iteration [ms]", xlim=(-0.6, len(mine) - 0.4))
         ax.grid(False, axis="x")
     letter_panels(axes)
     handles, labels = axes[0].get_legend_handles_labels()
