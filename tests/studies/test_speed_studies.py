@@ -14,7 +14,7 @@ from studies.choices import speed_error
 from studies.choices.iteration import PARTS, IterationCost
 from studies.choices.random_runs import errors, random_run
 from studies.choices.reference import Course, Reference
-from studies.choices.speed_error import ratio, seconds_at
+from studies.choices.speed_error import ComputedBlock, Curve, ratio, seconds_at
 from tests.studies.quick import quick
 
 
@@ -24,6 +24,23 @@ def test_seconds_at_an_error():
     assert seconds_at(10**-3.5, errors, seconds) == (pytest.approx(8.0), "measured")  # half way, both logarithmic
     assert seconds_at(1e-5, errors, seconds) == (pytest.approx(64.0), "extrapolated")
     assert seconds_at(1e-1, errors, seconds) == (1.0, "at most")
+
+
+def test_turns():
+    """A point that fails is dropped and said, one beyond 10 s runs once, the others in every turn."""
+
+    def block(seconds):
+        return ComputedBlock(np.zeros(1), np.zeros(1), None, 1, [seconds])
+
+    times = iter([1.0, 12.0, 3.0, 2.0])
+    makers = [lambda: block(next(times)), lambda: None, lambda: block(next(times))]
+    curve = Curve("dolfinx_euler_uniform", "", makers, [("2 x 2", 0.1), ("3 x 3", 0.1), ("4 x 4", 0.01)])
+    for _ in range(3):
+        curve.take_turn()
+    assert curve.seconds == [2.0, 12.0]
+    assert curve.failed == ["3 x 3, 0.1"]
+    assert curve.settings == [("2 x 2", 0.1), ("4 x 4", 0.01)]
+    assert curve.rival
 
 
 def test_ratio_to_the_fastest_rival():
