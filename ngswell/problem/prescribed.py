@@ -9,10 +9,11 @@ import numpy as np
 from ngsolve import GridFunction
 from numpy.typing import NDArray
 
+from ngswell.baths.bath import Bath
 from ngswell.baths.boundary import BathBoundary
 from ngswell.baths.treatment import Charge, PrescribedBoundary
 from ngswell.models.model import BathFields
-from ngswell.problem.bounded import set_bounded
+from ngswell.problem.bounded import Bounded
 from ngswell.problem.discretisation import Discretisation
 
 
@@ -28,6 +29,7 @@ class PrescribedValues:
         self._discretisation, self._fields, self._baths = discretisation, fields, baths
         self._treated = discretisation.setup.prescribed_baths
         self._pairs: list[tuple[NDArray, NDArray]] = []
+        self._set: dict[tuple[str, str], Bounded] = {}
         charge = discretisation.model.charge_field
         self._charges: dict[Charge, GridFunction] = {}
         if charge is not None:
@@ -47,16 +49,20 @@ class PrescribedValues:
                 self._boundaries[bath.boundary], self._charges.get(treatment.charge_of), self._equilibrium(bath.boundary)
             )
             for name, value in treatment.values(on).items():
-                component = self._fields.components[self._discretisation.names.index(name)]
-                on_boundary = GridFunction(component.space)
-                region = self._discretisation.mesh.Boundaries(bath.boundary)
-                if all(history.uniform for history in bath.schedules):
-                    on_boundary.Set(value, definedon=region)
-                else:
-                    set_bounded(on_boundary, value, region)
+                field = self._on_boundary(bath, name)
+                field.set(value)
                 dofs = self._dofs[name, bath.boundary]
                 start = self._discretisation.ranges[name].start
-                self._pairs.append((start + dofs, on_boundary.vec.FV().NumPy()[dofs]))
+                self._pairs.append((start + dofs, field.field.vec.FV().NumPy()[dofs]))
+
+    def _on_boundary(self, bath: Bath, name: str) -> Bounded:
+        """A field with the values of an unknown on the boundary of a bath."""
+        if (bath.boundary, name) not in self._set:
+            component = self._fields.components[self._discretisation.names.index(name)]
+            region = self._discretisation.mesh.Boundaries(bath.boundary)
+            uniform = all(history.uniform for history in bath.schedules)
+            self._set[bath.boundary, name] = Bounded(GridFunction(component.space), region, uniform)
+        return self._set[bath.boundary, name]
 
     def gap(self, vector: NDArray) -> NDArray:
         """What `vector` exceeds the prescribed values by, where there are any; zero elsewhere."""
