@@ -90,25 +90,6 @@ def test_verification(tmp_path):
         assert numbers[key] > order + (name == "u") - (0.25 if "_3d_order_3" in key else 0.15), key
 
 
-def test_hard_cases(tmp_path):
-    numbers, rows = quick("hard_cases", tmp_path)
-    assert numbers["wrong"] == 0
-    assert {row[3] for row in rows[1:]} == {"passes", "stops", "refused"}
-    assert all(row[-1] for row in rows[1:] if row[3] != "passes")  # with a reason
-    for key in (k for k in numbers if k.endswith("_error_over_bound")):
-        assert numbers[key] <= 1, key
-    # The consistent matrix' projection of a jump, √3 − 2; above the limit nothing alternates.
-    assert numbers["alternation_lowest"] == pytest.approx(3**0.5 - 2, rel=5e-3)
-    assert numbers["alternation_above_limit"] > -1e-6
-    assert numbers["alternation_difference"] < 1e-5
-    assert numbers["skin_graded"] < 1e-2 < 1 < numbers["skin_even"]
-    for variant in ("potential", "concentration"):  # second order away from the corner, first at it
-        assert numbers[f"corner_{variant}_area_order"] > 1.3
-        assert 0.8 < numbers[f"corner_{variant}_arch_order"] < 1.6
-    assert numbers["wrinkle_change"] < 0.03
-    assert numbers["wrinkle_hidden_um"] < 0 < numbers["wrinkle_um"]
-
-
 def test_output_is_refused_before_computing(tmp_path, capsys):
     (tmp_path / "oscillation.json").write_text("mine")
     assert main(["oscillation", "--quick", "--out", str(tmp_path)]) == 1
