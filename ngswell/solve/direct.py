@@ -14,13 +14,13 @@ from numpy.typing import NDArray
 from ngswell.problem.discretisation import Tie
 from ngswell.problem.forms import Form
 from ngswell.problem.problem import Problem
-from ngswell.solve.pardiso import Pardiso, library
+from ngswell.solve import pardiso, umfpack
 
 
 @cache
 def best_solver() -> str:
     """Name of the solver: pardiso where MKL is installed (`pip install ngswell[mkl]`), else umfpack."""
-    return "umfpack" if library() is None else "pardiso"
+    return "umfpack" if pardiso.library() is None else "pardiso"
 
 
 class Factors(Protocol):
@@ -37,7 +37,7 @@ class Factors(Protocol):
 
 
 class NGSolveFactors:
-    """Factors by one of the solvers that NGSolve brings."""
+    """Factors by one of the solvers that NGSolve calls itself."""
 
     def __init__(self, matrix: BaseMatrix, free: BitArray, name: str) -> None:
         self._matrix, self._free, self._name = matrix, free, name
@@ -65,6 +65,14 @@ class NGSolveFactors:
         return True
 
 
+def _factors(name: str, matrix: BaseMatrix, free: BitArray) -> Factors:
+    if name == "pardiso":
+        return pardiso.Pardiso(matrix, free)
+    if name == "umfpack" and umfpack.library() is not None:
+        return umfpack.Umfpack(matrix, free)
+    return NGSolveFactors(matrix, free, name)
+
+
 class LinearSolver:
     """Solves A x = b on the free degrees of freedom, for matrices of one pattern whose values change.
 
@@ -90,9 +98,7 @@ class LinearSolver:
     def factorise(self, matrix: BaseMatrix) -> bool:
         """Factorise `matrix`; False if it is singular or holds a value that is not finite."""
         if self._factors is None or matrix is not self._matrix:
-            mine = self.name == "pardiso"
-            self._matrix = matrix
-            self._factors = Pardiso(matrix, self._free) if mine else NGSolveFactors(matrix, self._free, self.name)
+            self._matrix, self._factors = matrix, _factors(self.name, matrix, self._free)
         if not self._factors.update():
             self._factors = None
             return False

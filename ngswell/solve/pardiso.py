@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ctypes import CDLL, byref, c_int, c_void_p
+from ctypes import CDLL, byref, c_int
 from functools import cache
 from importlib import metadata
 from weakref import finalize
@@ -10,9 +10,9 @@ from weakref import finalize
 import numpy as np
 import pyngcore
 from ngsolve import BaseMatrix, BaseVector, BitArray
-from numpy.typing import NDArray
 
 from ngswell.errors import InputError
+from ngswell.solve.free_part import FreePart, at
 
 ANALYSE, FACTORISE, SOLVE, RELEASE = 11, 22, 33, -1
 """Phases of Pardiso."""
@@ -69,15 +69,11 @@ class Pardiso:
     """
 
     def __init__(self, matrix: BaseMatrix, free: BitArray) -> None:
-        values, columns, starts = (np.asarray(part) for part in matrix.CSR())
-        if values.size > MOST_ENTRIES:
-            raise InputError(f"Pardiso: the matrix has {values.size} entries, at most {MOST_ENTRIES} go; use TwoLevelSolver")
-        self._matrix, self._all = matrix, values  # a view, of what the matrix holds at any time
-        mine = np.array(list(free), dtype=bool)
-        number, rows = np.cumsum(mine) - 1, np.repeat(np.arange(mine.size), np.diff(starts).astype(np.intp))
-        self._dofs, self._entries = np.flatnonzero(mine), np.flatnonzero(mine[rows] & mine[columns])
-        counts = np.bincount(number[rows[self._entries]], minlength=self._dofs.size)
-        self._system = _System(np.concatenate([[0], np.cumsum(counts)]), number[columns[self._entries]])
+        self._part = FreePart(matrix, free)
+        if self._part.columns.size > MOST_ENTRIES:
+            size = self._part.columns.size
+            raise InputError(f"Pardiso: the matrix has {size} entries, at most {MOST_ENTRIES} go; use TwoLevelSolver")
+        self._system = _System(self._part)
         self._analysed = False
         self.anew = False
         """Whether the last factorisation has an analysis of its own, which later ones share."""
@@ -85,10 +81,8 @@ class Pardiso:
 
     def update(self) -> bool:
         """Factorise the matrix as it is now; False where it is singular or holds a value that is not finite."""
-        system = self._system
-        if not np.isfinite(self._all.sum()):
+        if not self._part.take():
             return False
-        np.take(self._all, self._entries, out=system.values, mode="clip")
         suspended = pyngcore.SuspendTaskManager()  # else its threads and those of MKL wait for each other
         try:
             return self._factorised(pyngcore.GetNumThreads())
@@ -110,25 +104,23 @@ class Pardiso:
 
     def solve(self, right: BaseVector, solution: BaseVector) -> bool:
         """solution = A⁻¹ right on the free degrees of freedom, 0 elsewhere; False where it is no solution."""
-        system = self._system
-        np.take(right.FV().NumPy(), self._dofs, out=system.right, mode="clip")
+        system, part = self._system, self._part
+        part.take_right(right)
         solved = system.call(SOLVE)
-        values = solution.FV().NumPy()
-        values[:] = 0.0
-        values[self._dofs] = system.solution
+        part.put(solution)
         return solved and (not system.perturbed or system.is_solved())
 
 
 class _System:
     """What Pardiso is called with, apart so that it outlives what owns it by the call that frees the memory."""
 
-    def __init__(self, starts: NDArray, columns: NDArray) -> None:
+    def __init__(self, part: FreePart) -> None:
         loaded = library()
         if loaded is None:
             raise RuntimeError("Pardiso needs MKL: pip install ngswell[mkl]")
-        self._mkl, self._size = loaded, starts.size - 1
-        self._starts, self._columns = starts.astype(np.int32), columns.astype(np.int32)
-        self.values, self.right, self.solution = np.zeros(columns.size), np.zeros(self._size), np.zeros(self._size)
+        self._mkl, self._size = loaded, part.solution.size
+        self._starts, self._columns = part.starts.astype(np.int32), part.columns.astype(np.int32)
+        self.values, self.right, self.solution = part.values, part.right, part.solution
         self._handle, self.parameters = np.zeros(64, np.int64), np.zeros(64, np.int32)
         self.parameters[list(PARAMETERS)] = list(PARAMETERS.values())
 
@@ -139,9 +131,9 @@ class _System:
         one, error = byref(c_int(1)), c_int(0)
         before = self._mkl.MKL_Set_Num_Threads_Local(threads)
         self._mkl.pardiso(
-            *(_at(self._handle), one, one, byref(c_int(UNSYMMETRIC)), byref(c_int(phase)), byref(c_int(self._size))),
-            *(_at(self.values), _at(self._starts), _at(self._columns), None, one, _at(self.parameters)),
-            *(byref(c_int(0)), _at(self.right), _at(self.solution), byref(error)),
+            *(at(self._handle), one, one, byref(c_int(UNSYMMETRIC)), byref(c_int(phase)), byref(c_int(self._size))),
+            *(at(self.values), at(self._starts), at(self._columns), None, one, at(self.parameters)),
+            *(byref(c_int(0)), at(self.right), at(self.solution), byref(error)),
         )
         self._mkl.MKL_Set_Num_Threads_Local(before)
         return error.value == 0
@@ -156,7 +148,3 @@ class _System:
         products = self.values * self.solution[self._columns]
         left = np.abs(np.add.reduceat(products, self._starts[:-1]) - self.right)
         return bool(left.max() <= ACCURATE * np.abs(self.right).max())
-
-
-def _at(array: NDArray) -> c_void_p:
-    return c_void_p(array.ctypes.data)

@@ -1,4 +1,4 @@
-"""Pardiso with parameters of our own: right where matrices are hard, told where they are singular, memory given back."""
+"""Direct solvers without refinement: right where matrices are hard, told where they are singular, memory given back."""
 
 import ctypes
 import gc
@@ -8,11 +8,19 @@ import pytest
 from ngsolve import BitArray
 from ngsolve.la import SparseMatrixd
 
+from ngswell.solve import pardiso, umfpack
 from ngswell.solve.direct import LinearSolver
-from ngswell.solve.pardiso import Pardiso, library
 from tests.scenes import block, deformed
 
-pytestmark = pytest.mark.skipif(library() is None, reason="MKL is not installed")
+with_mkl = pytest.mark.skipif(pardiso.library() is None, reason="MKL is not installed")
+KINDS = [
+    pytest.param(pardiso.Pardiso, id="Pardiso", marks=with_mkl),
+    pytest.param(
+        umfpack.Umfpack,
+        id="UMFPACK",
+        marks=pytest.mark.skipif(umfpack.library() is None, reason="not to be called from outside"),
+    ),
+]
 
 PATTERN = 30
 
@@ -36,21 +44,22 @@ def put(matrix, dense):
 
 
 def solved(factors, matrix, right):
-    """Whether Pardiso has a solution, and which."""
+    """Whether there is a solution, and which."""
     b, x = matrix.CreateColVector(), matrix.CreateColVector()
     b.FV().NumPy()[:] = right
     x[:] = 7.0
     return factors.solve(b, x), x.FV().NumPy().copy()
 
 
-def test_solutions_are_those_of_the_free_part():
+@pytest.mark.parametrize("kind", KINDS)
+def test_solutions_are_those_of_the_free_part(kind):
     random = np.random.default_rng(2)
     dense = random.standard_normal((PATTERN, PATTERN))
     free = every(PATTERN)
     for dof in (0, 11, 29):
         free.Clear(dof)
     mine, right, matrix = np.array(list(free)), random.standard_normal(PATTERN), sparse(dense)
-    factors = Pardiso(matrix, free)
+    factors = kind(matrix, free)
     assert factors.update()
     found, x = solved(factors, matrix, right)
     assert found
@@ -73,9 +82,10 @@ def chain(stiffness, scale, zero=0.0):
 BOUND = chain(1.0, 1.0, 1.0) != 0
 
 
-def test_zeros_on_the_diagonal_and_values_that_change_by_orders():
+@pytest.mark.parametrize("kind", KINDS)
+def test_zeros_on_the_diagonal_and_values_that_change_by_orders(kind):
     matrix, right = sparse(chain(1.0, 1.0), BOUND), np.random.default_rng(5).standard_normal(220)
-    factors = Pardiso(matrix, every(220))
+    factors = kind(matrix, every(220))
     for stiffness in (1.0, 1e-9, 1e9):
         for scale in (1.0, 1e-7, 1e5):
             dense = chain(stiffness, scale)
@@ -88,11 +98,12 @@ def test_zeros_on_the_diagonal_and_values_that_change_by_orders():
             assert (np.abs(dense @ x - right) <= 1e-13 * sizes).all()
 
 
-def test_a_singular_matrix_is_told():
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_singular_matrix_is_told(kind):
     dense = np.random.default_rng(6).standard_normal((PATTERN, PATTERN))
     dense[:, 3] = dense[3, :] = 0.0
     matrix, right = sparse(dense), np.ones(PATTERN)
-    factors = Pardiso(matrix, every(PATTERN))
+    factors = kind(matrix, every(PATTERN))
     assert not (factors.update() and solved(factors, matrix, right)[0])
     dense[3, 3] = 1e-3  # negative control
     put(matrix, dense)
@@ -104,6 +115,7 @@ def test_a_singular_matrix_is_told():
     assert not factors.update()
 
 
+@with_mkl
 def test_what_is_shared_is_that_of_the_last_analysis_alone():
     # What makes runs that go on from a checkpoint equal to the bit.
     right = np.random.default_rng(7).standard_normal(220)
@@ -111,7 +123,7 @@ def test_what_is_shared_is_that_of_the_last_analysis_alone():
 
     def history(*values):
         matrix = sparse(values[0], BOUND)
-        factors, anew = Pardiso(matrix, every(220)), []
+        factors, anew = pardiso.Pardiso(matrix, every(220)), []
         for dense in values:
             put(matrix, dense)
             assert factors.update()
@@ -124,10 +136,11 @@ def test_what_is_shared_is_that_of_the_last_analysis_alone():
     assert long[1] == short[1]
 
 
+@with_mkl
 def test_memory_is_given_back():
     problem = block().problem
     deformed(problem)
-    matrix, mkl = problem.linearise(), library()
+    matrix, mkl = problem.linearise(), pardiso.library()
     mkl.MKL_Mem_Stat.restype = ctypes.c_longlong
     buffers = ctypes.c_int()
 
