@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from ngswell import BACKWARD_EULER, ESDIRK4
+from ngswell.stepping.attempts import parabola_at
 
 
 def tableau(scheme):
@@ -55,3 +56,21 @@ def test_stiff_modes_are_damped(z):
     # R(z) = (last stage) of y' = z y. A-stable alone would be 1 in size; L-stable falls as 1/z, here with a factor below 10.
     a, _ = tableau(ESDIRK4)
     assert abs(np.linalg.solve(np.eye(len(a)) - z * a, np.ones(len(a)))[-1]) < 10 / abs(z)
+
+
+@pytest.mark.parametrize(("count", "degree"), [(1, 0), (2, 1), (3, 2), (5, 2)])
+def test_what_a_stage_starts_from_is_exact_for_parabolas(count, degree):
+    times = np.array([1e6, 1e6 + 40, 1e6 + 70, 1e6 + 130, 1e6 + 150])[:count]  # steps far shorter than the time itself
+
+    def course(time):
+        return np.array([1.0, -3.0]) + ((time - 1e6) / 50) ** degree
+
+    found = parabola_at([(time, course(time)) for time in times], 1e6 + 200)
+    assert found == pytest.approx(course(1e6 + 200), rel=1e-12)  # times exact, weights of about one: round-off
+
+
+def test_what_a_stage_starts_from_is_of_least_squares():
+    times = [0.0, 0.5, 0.6, 0.7, 1.0]
+    noise = np.array([1.0, -2.0, 0.5, 1.5, -1.0])
+    found = parabola_at([(time, np.array([value])) for time, value in zip(times, noise, strict=True)], 1.4)
+    assert found == pytest.approx(np.polyval(np.polyfit(times, noise, 2), 1.4), rel=1e-12)
