@@ -127,7 +127,7 @@ class Adaptive:
     """Steps whose estimated error stays below `tolerance`.
 
     Errors are root mean squares over the body, relative to what the run itself does: the largest change of the field since
-    it began, so far or, by one rough step ahead, until the next kink. With ESDIRK4 the displacement at any time of the run
+    it began, so far or, by one rough step ahead, until the next kink. With ESDIRK4 the displacement at the end of any step
     is then within three times the tolerance of its largest change, as measured on random scenes. Estimates of the other
     fields are held below the same share of their largest change, or of a tenth of the displacement's in natural sizes,
     whichever is larger. The error is that of the embedded solution times a factor of safety. With backward Euler, whose
