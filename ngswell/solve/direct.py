@@ -9,8 +9,10 @@ from typing import Protocol
 import numpy as np
 from netgen.meshing import NgException
 from ngsolve import BaseMatrix, BaseVector, BitArray
+from ngsolve.la import SparseMatrixd
 from numpy.typing import NDArray
 
+from ngswell.errors import InputError
 from ngswell.problem.discretisation import Tie
 from ngswell.problem.forms import Form
 from ngswell.problem.problem import Problem
@@ -21,6 +23,21 @@ from ngswell.solve import pardiso, umfpack
 def best_solver() -> str:
     """Name of the solver: pardiso where MKL is installed (`pip install ngswell[mkl]`), else umfpack."""
     return "umfpack" if pardiso.library() is None else "pardiso"
+
+
+@cache
+def _why_not(name: str) -> str | None:
+    """Why there is no such solver here, tried on a matrix of one entry; None where there is."""
+    if name == "sparsecholesky" or name.endswith("spd"):
+        return "is for symmetric matrices, which dr/dx is not"
+    if name == "pardiso":
+        return "needs MKL: pip install ngswell[mkl]" if pardiso.library() is None else None
+    one = SparseMatrixd.CreateFromCOO([0], [0], [1.0], 1, 1)
+    try:
+        one.Inverse(inverse=name)
+    except (NgException, ImportError, RuntimeError) as error:
+        return f"is not to be had from this NGSolve ({error})"
+    return None
 
 
 class Factors(Protocol):
@@ -82,6 +99,9 @@ class LinearSolver:
     2. `invert`: the solution on the free degrees of freedom; False where none is found;
     3. `linearise`, if it takes another matrix than `problem.linearise()`;
     4. `direct`, `name`: whether problems are of a size that is factorised as a whole, and what to call it.
+
+    `name` is "pardiso", or one of NGSolve's solvers for unsymmetric matrices: "umfpack", or "cudss" on a graphics card where
+    NGSolve has it (never tried by us). Raises InputError for a name that does not work here.
     """
 
     direct = True
@@ -89,6 +109,8 @@ class LinearSolver:
 
     def __init__(self, free: BitArray, name: str | None = None) -> None:
         self.name = name or best_solver()
+        if refused := _why_not(self.name):
+            raise InputError(f"linear solver {self.name!r} {refused}; without a name it is {best_solver()!r}")
         self._free = free
         self._matrix: BaseMatrix | None = None
         self._factors: Factors | None = None

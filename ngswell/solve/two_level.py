@@ -1,142 +1,120 @@
-"""An iterative linear solver for large bodies in space: GMRES with a two-level preconditioner."""
+"""An iterative linear solver for large bodies in space: Krylov's method with a two-level preconditioner."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
 import numpy as np
-from netgen.meshing import NgException
 from ngsolve import ELEMENT, VOL, BaseMatrix, BaseVector, BitArray, NodeId
-from ngsolve.krylovspace import GMResSolver
+from ngsolve.la import SparseMatrixd
 from numpy.typing import NDArray
 
 from ngswell.errors import InputError
 from ngswell.problem.problem import Problem
 from ngswell.solve.direct import LinearSolver
+from ngswell.solve.krylov import Krylov
+from ngswell.solve.patches import Patches
 
-TOLERANCE = 1e-8
-"""GMRES stops when the preconditioned residual has fallen by this factor. That residual estimates the error."""
+TOLERANCE = 1e-3
+"""A solve stops when the preconditioned residual, which estimates the error, has fallen by this factor. Corrections are all
+that is solved for, and Newton's method looks at what they leave: a kept matrix leaves up to a third anyway."""
 
 ROUND_OFF = 1e-13
-"""GMRES also stops below this residual, in units of the fields. At a state of rest the right-hand side is round-off only."""
+"""It also stops below this residual, in units of the fields. At a state of rest the right-hand side is round-off only."""
 
-MOST_ITERATIONS = 40
-"""Iterations of GMRES. A matrix that needs more gets the larger coarse level. There three times as many are allowed."""
-
-EASY = 10
-"""Iterations on the larger coarse level. After a solve with so few, the next matrix gets the smaller level."""
+MOST_ITERATIONS = 150
+"""Iterations of a solve. A step of 1e-4 of the time that fluid takes to cross a cell needs some forty."""
 
 
 class TwoLevelSolver(LinearSolver):
-    """Solves A x = b on the free degrees of freedom of a problem by GMRES: `scene.run(..., solver=TwoLevelSolver)`.
+    """Solves A x = b on the free degrees of freedom of a problem iteratively: `scene.run(..., solver=TwoLevelSolver)`.
 
-    The preconditioner is one cycle on the whole system, all fields together: exact solves on the cells around each vertex
-    (block Gauss-Seidel), an exact solve on the coarse level, which is spanned by the functions of first order, and the
-    solves around vertices again in reverse order. The bases are hierarchical: all these are submatrices of A.
+    The preconditioner B is an exact solve on the coarse level, which is spanned by the functions of first order, and then
+    exact solves on the cells around each vertex, added up. The bases are hierarchical: all these are submatrices of A.
+    B A x = B b is solved to `tolerance`, every coefficient counted in the unit of its field (`Problem.references`), in the
+    space of what earlier solves with A have tried (`Krylov`).
 
-    In steps far shorter than fluid takes to cross a cell, displacements have to preserve volume, and those of first
-    order cannot do that together with pressures of first order. The coarse level then takes in what belongs to facets,
-    as the element of Bernardi and Raugel does; the number of iterations decides.
+    In steps far shorter than fluid takes to cross a cell, displacements have to preserve volume, which those of first
+    order cannot together with pressures of first order: iterations rise to three or four times their number.
 
-    Where facets have no functions of their own (tetrahedra of order 2), the larger level is the whole system.
-
-    GMRES measures each field in units of its reference (`Problem.references`). Raises InputError for a body in 1-d.
+    Raises InputError for a body in 1-d.
     """
 
     direct = False
+    tolerance = TOLERANCE
 
     def __init__(self, problem: Problem) -> None:
         if problem.mesh.dim == 1:
             raise InputError("TwoLevelSolver is for bodies in the plane and in space; leave solver= out for a column")
         super().__init__(problem.free)
-        self.iterations = 0  # of the last solve
-        self._patches, self._levels = _patches(problem), _coarse_levels(problem)
         self._units = problem.sizes
-        self._level = 0
-        self._smoother: BaseMatrix | None = None
-        self._coarse: LinearSolver | None = None
+        self._level = _coarse_level(problem)
+        self._coarse = LinearSolver(self._level)
+        self._dofs_of_patches = _patches(problem)
+        self._patches: Patches | None = None  # with the columns, known from the first matrix on
+        self._columns: _Columns | None = None
+        self._krylov = Krylov(self._units.size, MOST_ITERATIONS)
+        self._values, self._left, self._correction = (problem.fields.vec.CreateVector() for _ in range(3))
 
     @property
-    def with_facets(self) -> bool:
-        """Whether the coarse level is the larger one."""
-        return self._level > 0
+    def iterations(self) -> int:
+        """Of the last solve."""
+        return self._krylov.iterations
 
     def factorise(self, matrix: BaseMatrix) -> bool:
         """Prepare the preconditioner of `matrix`; False if a part of it is singular or a value is not finite."""
-        if self._level and self.iterations <= EASY:
-            self._level, self._coarse = 0, None
-        self._matrix, self._smoother = matrix, None
-        if self._coarse is None:
-            self._coarse = LinearSolver(self._levels[self._level])
+        self._krylov.forget()
+        self._matrix = None
         if not self._coarse.factorise(matrix):
             return False
-        try:
-            self._smoother = matrix.CreateBlockSmoother(self._patches)
-        except NgException:
+        if self._patches is None or self._columns is None:
+            self._patches = Patches(self._dofs_of_patches, matrix)
+            self._columns = _Columns(matrix, self._level)
+        if not self._patches.prepare(matrix):
             return False
+        self._columns.update(matrix)
+        self._matrix = matrix
         self.factorisations += 1
         return True
 
     def invert(self, right: BaseVector, solution: BaseVector) -> bool:
-        """A⁻¹ on the free degrees of freedom; False if GMRES does not converge."""
-        if self._matrix is None or self._smoother is None:
+        """A⁻¹ on the free degrees of freedom, to `tolerance`; False if that takes too many iterations."""
+        if self._matrix is None:
             raise RuntimeError("factorise before solving")
-        if self._level == 0:
-            if self._gmres(right, solution, MOST_ITERATIONS):
-                return True
-            self._level, self._coarse = 1, LinearSolver(self._levels[1])
-            if not self._coarse.factorise(self._matrix):
-                return False
-        return self._gmres(right, solution, 3 * MOST_ITERATIONS)
+        self._left.data = right
+        found = self._krylov.solve(self._product, self._cycle(), self.tolerance, ROUND_OFF)
+        if found is None or not np.isfinite(found).all():
+            return False
+        solution.FV().NumPy()[:] = found * self._units
+        return True
 
-    def _gmres(self, right: BaseVector, solution: BaseVector, most: int) -> bool:
-        assert self._coarse is not None
-        cycle = _Cycle(self._matrix, self._smoother, self._coarse)
-        found = gmres(self._matrix, cycle, self._units, right, solution, most)
-        self.iterations = most if found is None else found
-        return found is not None
+    def _product(self, values: NDArray) -> NDArray:
+        """B A x, in units of the fields."""
+        self._values.FV().NumPy()[:] = values * self._units
+        self._left.data = self._matrix * self._values
+        return self._cycle()
 
-
-def gmres(
-    matrix: BaseMatrix, preconditioner: BaseMatrix, units: NDArray, right: BaseVector, solution: BaseVector, most: int
-) -> int | None:
-    """solution = A⁻¹ right to `TOLERANCE`, every coefficient counted in its unit; iterations, None if `most` are too few."""
-
-    def product(a: BaseVector, b: BaseVector) -> float:
-        return float(np.dot(a.FV().NumPy() / units, b.FV().NumPy() / units))
-
-    method = GMResSolver(matrix, preconditioner, tol=TOLERANCE, atol=ROUND_OFF, maxiter=most + 1, innerproduct=product)
-    method.Solve(right, solution)
-    converged = method.residuals[-1] <= max(TOLERANCE * method.residuals[0], ROUND_OFF)
-    if not converged or not np.isfinite(solution.FV().NumPy()).all():
-        return None
-    return method.iterations - 1  # it counts the start
+    def _cycle(self) -> NDArray:
+        """B r for r in `_left`, in units of the fields."""
+        assert self._patches is not None
+        assert self._columns is not None
+        self._coarse.invert(self._left, self._correction)
+        self._left.data -= self._columns.matrix * self._correction
+        return (self._correction.FV().NumPy() + self._patches(self._left.FV().NumPy())) / self._units
 
 
-class _Cycle(BaseMatrix):
-    """The preconditioner as a linear map."""
+class _Columns:
+    """The columns of a matrix that belong to chosen degrees of freedom, as a matrix."""
 
-    def __init__(self, matrix: BaseMatrix, smoother: BaseMatrix, coarse: LinearSolver) -> None:
-        super().__init__()
-        self._matrix, self._smoother, self._coarse = matrix, smoother, coarse
-        self._left, self._correction = matrix.CreateColVector(), matrix.CreateColVector()
+    def __init__(self, matrix: BaseMatrix, chosen: BitArray) -> None:
+        _, columns, starts = (np.asarray(part) for part in matrix.CSR())
+        mine, size = np.array(list(chosen), dtype=bool)[columns], matrix.height
+        before = np.concatenate([[0], np.cumsum(mine)])[starts.astype(np.intp)]  # in the rows above
+        rows = np.repeat(np.arange(size, dtype=np.int32), np.diff(before))
+        self._entries: NDArray = np.flatnonzero(mine).astype(np.int32 if mine.size < 2**31 else np.int64)
+        self.matrix = SparseMatrixd.CreateFromCOO(rows, columns[mine].astype(np.int32), np.zeros(rows.size), size, size)
 
-    def Height(self) -> int:
-        return self._matrix.height
-
-    def Width(self) -> int:
-        return self._matrix.width
-
-    def CreateVector(self, column: bool) -> BaseVector:
-        return self._matrix.CreateColVector()
-
-    def Mult(self, right: BaseVector, result: BaseVector) -> None:
-        result[:] = 0.0
-        self._smoother.Smooth(result, right)
-        self._left.data = right - self._matrix * result
-        self._coarse.solve(self._left, self._correction)
-        result.data += self._correction
-        self._smoother.SmoothBack(result, right)
+    def update(self, matrix: BaseMatrix) -> None:
+        """Take the values of another matrix of the same pattern."""
+        np.take(np.asarray(matrix.CSR()[0]), self._entries, out=self.matrix.AsVector().FV().NumPy(), mode="clip")
 
 
 def _patches(problem: Problem) -> list[list[int]]:
@@ -154,19 +132,14 @@ def _patches(problem: Problem) -> list[list[int]]:
     return [patch for patch in free if patch]
 
 
-def _coarse_levels(problem: Problem) -> tuple[BitArray, BitArray]:
-    """Free degrees of freedom of first order and numbers, and with them those of facets."""
-
-    def of(dofs: Iterable[int]) -> BitArray:
-        chosen = BitArray(problem.space.ndof)
-        chosen.Clear()
-        for dof in dofs:
-            if dof >= 0 and problem.free[dof]:
+def _coarse_level(problem: Problem) -> BitArray:
+    """Free degrees of freedom of first order, and numbers."""
+    chosen = BitArray(problem.space.ndof)
+    chosen.Clear()
+    for name in problem.numbers:
+        chosen.Set(problem.ranges[name].start)
+    for vertex in problem.mesh.vertices:
+        for dof in problem.space.GetDofNrs(vertex):
+            if dof >= 0:
                 chosen.Set(dof)
-        return chosen
-
-    dofs_of, mesh = problem.space.GetDofNrs, problem.mesh
-    numbers = [problem.ranges[name].start for name in problem.numbers]
-    vertices = of([*numbers, *(dof for vertex in mesh.vertices for dof in dofs_of(vertex))])
-    with_facets = vertices | of(dof for facet in mesh.facets for dof in dofs_of(facet))
-    return vertices, with_facets if with_facets.NumSet() > vertices.NumSet() else problem.free
+    return chosen & problem.free

@@ -15,13 +15,13 @@ direct solver is that of the runs (`linear_solver`), at its largest size unless 
 - `tangent_seconds_D`, `residual_seconds_D`, `first_seconds_D`, `factor_seconds_D`, `solve_seconds_D`: at the largest size;
 - `pardiso_over_umfpack_factor_time_D`, `..._first_time_D`, `..._solve_time_D`, `..._memory_D`: at the largest common size,
   where both exist;
-- `two_level_over_direct_time_D` (numeric factorisation and solve), `two_level_over_direct_memory_D`: at the largest common
-  size; `two_level_faster_from_D`: smallest N from which on the ratio of times is below one (0 if none);
-- `two_level_iterations_D`: GMRES's to 1e-8 in a step of 10 s, at its largest size;
-- `tried_unknowns_3d`: N at which steps of T = 0.1 to 100 s are tried: `two_level_iterations_3d_dt_T`,
-  `two_level_seconds_3d_dt_T` (preparing and solving), `two_level_facets_3d_dt_T`: 1 if the coarse level needed facets;
-  `recycled_iterations_3d_dt_T` (0: not converged), `recycled_seconds_3d_dt_T`: GMRES preconditioned by the factorisation of
-  the step before, of 10 s; `tried_direct_seconds_3d`: numeric factorisation and solve there.
+- `two_level_over_direct_time_D` (numeric factorisation and `SOLVES` solves, as a matrix of fourth-order steps is kept),
+  `two_level_over_direct_time_one_solve_D`, `two_level_over_direct_memory_D`: at the largest common size;
+  `two_level_faster_from_D`, `two_level_faster_from_one_solve_D`: smallest N from which on the ratio of times is below one (0
+  if none);
+- `two_level_iterations_D`: those of a solve in a step of 10 s, at its largest size;
+- `tried_unknowns_3d`: N at which steps of T = 0.01 to 100 s are tried: `two_level_iterations_3d_dt_T`,
+  `two_level_seconds_3d_dt_T` (preparing and solving); `tried_direct_seconds_3d`: numeric factorisation and solve there.
 """
 
 from __future__ import annotations
@@ -32,36 +32,38 @@ from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field
 from multiprocessing import get_context
 from statistics import median
-from time import perf_counter
+from time import process_time
 
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
-from ngsolve import CF, BaseMatrix, BaseVector, TaskManager, x, y, z
+from ngsolve import CF, BaseVector, TaskManager, x, y, z
 from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
 from ngswell import TABLE_2, Potential, Ramp, Scene
 from ngswell.closed_forms.homogeneous import homogeneous_equilibrium
 from ngswell.problem.problem import Problem
-from ngswell.solve.direct import LinearSolver, best_solver
-from ngswell.solve.two_level import TwoLevelSolver, gmres
+from ngswell.solve.direct import CondensedSolver, LinearSolver, best_solver
+from ngswell.solve.two_level import TwoLevelSolver
 from studies.limits import cylinder
 from studies.output import Findings, letter_panels
 from studies.scenes import INITIAL, SIDE, WIDTH, free_swelling_block, with_model
 
-CELLS: dict[int, tuple[int, ...]] = {2: (10, 20, 40, 80, 160, 320, 480), 3: (3, 4, 6, 8, 11, 14, 17, 24, 32)}
+CELLS: dict[int, tuple[int, ...]] = {2: (10, 20, 40, 80, 160, 320), 3: (4, 6, 8, 11, 14, 17, 24)}
 """Cells along the height (2-d) or each edge (3-d)."""
 QUICK_CELLS: dict[int, tuple[int, ...]] = {2: (10, 20, 40), 3: (3, 4, 6)}
 STEP = 10.0  # s
-STEPS = (100.0, 10.0, 1.0, 0.1)  # s, from easy to hard
+STEPS = (100.0, 10.0, 1.0, 0.1, 0.01)  # s, from easy to hard
 TRIED = 11
-"""Cells up to which steps of several sizes are tried in space, and old factorisations as preconditioners."""
-LONGEST = {"direct": 240.0, "umfpack": 60.0, "two-level": 240.0}
+"""Cells up to which steps of several sizes are tried in space."""
+SOLVES = 12
+"""Solves with a matrix in steps of fourth order, counted in the run of the block to 7070 s on 6³ cells, tolerance 1e-3."""
+LONGEST = {"direct": 120.0, "umfpack": 20.0, "two-level": 200.0}
 """Seconds that a size may take, extrapolated."""
-REPEATING = 10.0
+REPEATING = 3.0
 """Seconds for which systems are repeated, seven at most."""
 SHARE = 0.8
 """Of the machine's memory that a size may take, extrapolated."""
@@ -72,17 +74,16 @@ TIMES = ("tangent", "residual", "first", "again", "solve")
 
 @dataclass(frozen=True)
 class Trial:
-    """One linear solve by GMRES: step [s], iterations (0: not converged), whether the level with facets was needed."""
+    """One system by the two-level solver: step [s], iterations, seconds."""
 
     dt: float
     iterations: int
     seconds: float
-    facets: bool = False
 
 
 @dataclass(frozen=True)
 class Size:
-    """What one size took: medians in seconds, memory in bytes."""
+    """What one size took: medians in seconds of the processor, memory in bytes."""
 
     dimension: int
     solver: str
@@ -104,7 +105,11 @@ class Size:
     @property
     def linear(self) -> float:
         """Seconds for one linear system after the first."""
-        return self.again + self.solve
+        return self.kept(1)
+
+    def kept(self, solves: int) -> float:
+        """Seconds for a matrix after the first and so many solves with it."""
+        return self.again + solves * self.solve
 
 
 def body(dimension: int, cells: int) -> Scene:
@@ -125,69 +130,78 @@ def swell(problem: Problem) -> None:
     problem.fields.components[0].Set(CF(displacement))
 
 
+def make_solver(problem: Problem, name: str) -> LinearSolver:
+    """The two-level solver, or the direct one of a run by its name."""
+    if name == "two-level":
+        return TwoLevelSolver(problem)
+    return (
+        LinearSolver(problem.free, name)
+        if problem.condensed is None
+        else CondensedSolver(problem.condensed, problem.free, name)
+    )
+
+
 def measure(dimension: int, cells: int, name: str, trials: bool) -> Size:
     """One size; `name` is that of a direct solver or "two-level". Runs in a process of its own, so memory is its own."""
-    clock = perf_counter()
+    clock = process_time()
     problem = body(dimension, cells).problem
     taken: dict[str, list[float]] = {part: [] for part in TIMES}
     with TaskManager(), threadpool_limits(1, user_api="blas"):
         swell(problem)
         problem.begin_step(INITIAL + STEP, STEP)
-        correction = problem.fields.vec.CreateVector()
-        before = memory("VmRSS")
-        matrix = problem.linearise()
+        residual, correction, gap = (problem.fields.vec.CreateVector() for _ in range(3))
+        solver = make_solver(problem, name)
+        matrix = solver.linearise(problem)
         assembled = memory("VmRSS")
-        start = perf_counter()
-        solver = TwoLevelSolver(problem) if name == "two-level" else LinearSolver(problem.free, name)
+        start = process_time()
         require(solver.factorise(matrix))
-        taken["first"].append(perf_counter() - start)
-        require(solver.solve(right_hand_side(problem, matrix), correction))
+        taken["first"].append(process_time() - start)
+        correct(problem, solver, residual, gap, correction)
         factorised = memory("VmHWM")
-        problem.vector[:] -= correction.FV().NumPy() + problem.gap()
+        problem.vector[:] -= correction.FV().NumPy()
 
         problem.begin_step(INITIAL + 2 * STEP, STEP)
-        systems, budget = 0, perf_counter() + REPEATING
-        while systems == 0 or (systems < 7 and perf_counter() < budget):
-            start = perf_counter()
-            matrix = problem.linearise()
-            taken["tangent"].append(perf_counter() - start)
-            start = perf_counter()
+        systems, budget = 0, process_time() + REPEATING
+        while systems == 0 or (systems < 7 and process_time() < budget):
+            start = process_time()
+            matrix = solver.linearise(problem)
+            taken["tangent"].append(process_time() - start)
+            start = process_time()
             require(solver.factorise(matrix))
-            taken["again"].append(perf_counter() - start)
-            start = perf_counter()
-            problem.residual(correction)
-            taken["residual"].append(perf_counter() - start)
-            right = right_hand_side(problem, matrix)
-            start = perf_counter()
-            require(solver.solve(right, correction))
-            taken["solve"].append(perf_counter() - start)
+            taken["again"].append(process_time() - start)
+            seconds = correct(problem, solver, residual, gap, correction)
+            taken["residual"].append(seconds[0])
+            taken["solve"].append(seconds[1])
             systems += 1
-        problem.vector[:] -= correction.FV().NumPy() + problem.gap()
         iterations = solver.iterations if isinstance(solver, TwoLevelSolver) else 1
-        tried = try_steps(problem, solver, INITIAL + 2 * STEP) if trials else []
+        problem.vector[:] -= correction.FV().NumPy()
+        tried = try_steps(problem, solver, INITIAL + 2 * STEP) if trials and isinstance(solver, TwoLevelSolver) else []
     return Size(
         dimension,
         name,
         cells,
         problem.space.ndof,
         **{part: median(values) for part, values in taken.items()},
-        assembly_bytes=assembled - before,
+        assembly_bytes=12 * matrix.nze + 8 * matrix.height,  # values, columns and beginnings of rows
         factor_bytes=factorised - assembled,
         peak_bytes=memory("VmHWM"),
         iterations=iterations,
         systems=systems + 1 + len(tried),
-        seconds=perf_counter() - clock,
+        seconds=process_time() - clock,
         trials=tuple(tried),
     )
 
 
-def right_hand_side(problem: Problem, matrix: BaseMatrix) -> BaseVector:
-    """r − A gap: Newton's correction of the fields, prescribed values included."""
-    residual, gap = problem.fields.vec.CreateVector(), problem.fields.vec.CreateVector()
+def correct(
+    problem: Problem, solver: LinearSolver, residual: BaseVector, gap: BaseVector, correction: BaseVector
+) -> tuple[float, float]:
+    """Newton's correction of the fields, prescribed values included; seconds for the residual and the solve."""
+    start = process_time()
     problem.residual(residual)
+    between = process_time()
     gap.FV().NumPy()[:] = problem.gap()
-    residual.data -= matrix * gap
-    return residual
+    require(solver.solve(residual, correction, gap))
+    return between - start, process_time() - between
 
 
 def require(done: bool) -> None:
@@ -195,41 +209,19 @@ def require(done: bool) -> None:
         raise RuntimeError("the linear system was not solved")
 
 
-class Recycled(BaseMatrix):
-    """The solves of an old factorisation, as a preconditioner."""
-
-    def __init__(self, solver: LinearSolver, size: int) -> None:
-        super().__init__()
-        self.solver, self.size = solver, size
-
-    def Height(self) -> int:
-        return self.size
-
-    def Width(self) -> int:
-        return self.size
-
-    def Mult(self, right: BaseVector, result: BaseVector) -> None:
-        self.solver.solve(right, result)
-
-
-def try_steps(problem: Problem, solver: LinearSolver, now: float) -> list[Trial]:
-    """First systems of steps of several sizes: by the two-level solver, or by GMRES on the factorisation at hand."""
-    found, state, solution = [], problem.vector.copy(), problem.fields.vec.CreateVector()
+def try_steps(problem: Problem, solver: TwoLevelSolver, now: float) -> list[Trial]:
+    """First systems of steps of several sizes."""
+    found, state = [], problem.vector.copy()
+    residual, correction, gap = (problem.fields.vec.CreateVector() for _ in range(3))
     for dt in STEPS:
         problem.vector[:] = state
         problem.begin_step(now + dt, dt)
-        matrix = problem.linearise()
-        right = right_hand_side(problem, matrix)
-        if not isinstance(solver, TwoLevelSolver):
-            start = perf_counter()
-            old = Recycled(solver, problem.space.ndof)
-            iterations = gmres(matrix, old, problem.sizes, right, solution, most=150)
-            found.append(Trial(dt, iterations or 0, perf_counter() - start))
-        else:
-            require(solver.factorise(matrix) and solver.solve(right, solution))  # decides on the level
-            start = perf_counter()
-            require(solver.factorise(matrix) and solver.solve(right, solution))
-            found.append(Trial(dt, solver.iterations, perf_counter() - start, solver.with_facets))
+        matrix = solver.linearise(problem)
+        start = process_time()
+        require(solver.factorise(matrix))
+        prepared = process_time() - start
+        seconds = prepared + correct(problem, solver, residual, gap, correction)[1]
+        found.append(Trial(dt, solver.iterations, seconds))
     return found
 
 
@@ -259,7 +251,7 @@ def series(dimension: int, name: str, cells: Sequence[int], longest: float) -> l
             )
             if seconds > longest or peak > SHARE * machine_memory():
                 break
-        trials = dimension == 3 and count <= TRIED and name in (best_solver(), "two-level")
+        trials = dimension == 3 and count <= TRIED
         with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as process:
             done.append(process.submit(measure, dimension, count, name, trials).result())
     progress.close()
@@ -342,20 +334,22 @@ def of_two_level(d: str, sizes: Sequence[Size], direct: Sequence[Size]) -> dict[
     """The iterative solver against the direct one."""
     pairs = common(sizes, direct)
     mine, other = pairs[-1]
-    faster = 0
-    for two, one in reversed(pairs):
-        if two.linear >= one.linear:
-            break
-        faster = two.unknowns
-    return {
+    found: dict[str, float | int | str] = {
         f"two_level_largest_unknowns_{d}": sizes[-1].unknowns,
         f"two_level_iterations_{d}": sizes[-1].iterations,
         f"two_level_exponent_time_{d}": exponent(sizes, "linear"),
         f"two_level_exponent_memory_{d}": exponent(sizes, "factor_bytes"),
-        f"two_level_over_direct_time_{d}": mine.linear / other.linear,
         f"two_level_over_direct_memory_{d}": mine.factor_bytes / other.factor_bytes,
-        f"two_level_faster_from_{d}": faster,
     }
+    for solves, which in ((SOLVES, d), (1, f"one_solve_{d}")):
+        faster = 0
+        for two, one in reversed(pairs):
+            if two.kept(solves) >= one.kept(solves):
+                break
+            faster = two.unknowns
+        found[f"two_level_over_direct_time_{which}"] = mine.kept(solves) / other.kept(solves)
+        found[f"two_level_faster_from_{which}"] = faster
+    return found
 
 
 def of_umfpack(d: str, sizes: Sequence[Size], pardiso: Sequence[Size]) -> dict[str, float | int | str]:
@@ -377,11 +371,10 @@ def of_steps(two_level: Sequence[Size], direct: Sequence[Size]) -> dict[str, flo
         "tried_unknowns_3d": two.unknowns,
         "tried_direct_seconds_3d": one.linear,
     }
-    for name, size in (("two_level", two), ("recycled", one)):
-        for trial in size.trials:
-            numbers[f"{name}_iterations_3d_dt_{trial.dt:g}"] = trial.iterations
-            numbers[f"{name}_seconds_3d_dt_{trial.dt:g}"] = trial.seconds
-    return numbers | {f"two_level_facets_3d_dt_{trial.dt:g}": int(trial.facets) for trial in two.trials}
+    for trial in two.trials:
+        numbers[f"two_level_iterations_3d_dt_{trial.dt:g}"] = trial.iterations
+        numbers[f"two_level_seconds_3d_dt_{trial.dt:g}"] = trial.seconds
+    return numbers
 
 
 def draw(grown: dict[int, dict[str, list[Size]]], direct: str) -> Figure:

@@ -30,15 +30,12 @@ def test_growth(tmp_path):
         assert numbers[f"largest_unknowns_{d}d"] == unknowns(d, cells[-1])
         # A matrix takes so much per unknown; on so few cells the boundary and the allocator's steps still show.
         assert numbers[f"exponent_assembly_memory_{d}d"] == pytest.approx(1, abs=0.25)
-        # Patches and a coarse level of a quarter of the unknowns against factors of the whole.
-        assert numbers[f"two_level_over_direct_memory_{d}d"] < 0.8
+        # Patches and a coarse level of a quarter of the unknowns against factors of the whole. In the plane, on so few,
+        # what the set-up takes once is as much again.
+        assert numbers[f"two_level_over_direct_memory_{d}d"] < {2: 1.2, 3: 0.8}[d]
         assert 1 < numbers[f"two_level_iterations_{d}d"] < 20
 
-    # Fluid has time to cross a cell in 100 s, not in 0.1 s.
-    assert numbers["two_level_facets_3d_dt_100"] == 0
-    assert numbers["two_level_facets_3d_dt_0.1"] == 1
-    assert all(0 < numbers[f"two_level_iterations_3d_dt_{dt:g}"] <= 40 for dt in STEPS)
-    # An old factorisation is a good preconditioner for its own step and a worse one the further the step is from it.
-    recycled = {dt: numbers[f"recycled_iterations_3d_dt_{dt:g}"] for dt in STEPS}
-    assert 0 < recycled[10.0] < recycled[1.0] < recycled[0.1]
-    assert recycled[10.0] < recycled[100.0]
+    # Fluid has time to cross a cell in 100 s, not in 0.01 s.
+    iterations = [numbers[f"two_level_iterations_3d_dt_{dt:g}"] for dt in STEPS]
+    assert iterations == sorted(iterations)
+    assert 3 < iterations[0] < 20 < iterations[-1] < 50

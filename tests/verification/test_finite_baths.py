@@ -212,7 +212,7 @@ def test_wrinkles_grow_in_a_beaker_as_in_an_infinite_bath():
 
 
 def test_the_two_level_solver_takes_a_beaker():
-    # The number belongs to no vertex: it stands on the coarse level. Within ten times GMRES's tolerance of 1e-8.
+    # The number belongs to no vertex: it stands on the coarse level. Within ten times Newton's tolerance of 1e-8.
     motion, mesh, supports, boundary, volume, _ = MOTIONS[-1]
     ends = []
     for options in ({}, {"solver": TwoLevelSolver}):

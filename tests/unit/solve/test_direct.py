@@ -1,5 +1,7 @@
 """The direct solvers: refactorised, condensed, and given what has no solution."""
 
+import contextlib
+
 import numpy as np
 import pytest
 
@@ -20,7 +22,8 @@ from ngswell import (
     box,
     rectangle,
 )
-from ngswell.solve.direct import CondensedSolver, LinearSolver, best_solver, solver_of
+from ngswell.errors import InputError
+from ngswell.solve.direct import CondensedSolver, LinearSolver, _why_not, best_solver, solver_of
 from tests.scenes import block, confined_column, deformed
 
 
@@ -88,3 +91,26 @@ def test_nan_in_the_matrix_is_noticed():
     matrix = problem.linearise()
     matrix.AsVector().FV().NumPy()[7] = np.nan
     assert not LinearSolver(problem.free).factorise(matrix)
+
+
+@pytest.mark.parametrize(
+    ("name", "reason"),
+    [
+        ("sparsecholesky", "is for symmetric matrices"),
+        ("pardisospd", "is for symmetric matrices"),
+        ("nonsense", "is not to be had from this NGSolve"),
+    ],
+)
+def test_a_solver_that_does_not_fit_is_refused_by_name(name, reason):
+    with pytest.raises(InputError, match=f"linear solver '{name}' {reason}.*without a name it is '{best_solver()}'"):
+        LinearSolver(block().problem.free, name)
+
+
+def test_cudss_is_taken_by_name_or_refused():
+    # Untested beyond its name: no machine of ours has a graphics card that NGSolve's cudss runs on.
+    problem = block().problem
+    refused = (
+        contextlib.nullcontext() if _why_not("cudss") is None else pytest.raises(InputError, match="linear solver 'cudss'")
+    )
+    with refused:
+        assert LinearSolver(problem.free, "cudss").name == "cudss"

@@ -1,8 +1,8 @@
-"""The two-level solver against the direct one, and when it changes its coarse level."""
+"""The two-level solver against the direct one, over cells, orders, models and steps."""
 
 import numpy as np
 import pytest
-from ngsolve import BaseMatrix, TaskManager
+from ngsolve import CF, TaskManager, x, y, z
 from threadpoolctl import threadpool_limits
 
 from ngswell import (
@@ -22,9 +22,10 @@ from ngswell import (
     box,
     rectangle,
 )
+from ngswell.closed_forms.homogeneous import homogeneous_equilibrium
 from ngswell.solve.direct import LinearSolver, solver_of
 from ngswell.solve.factorisation import Factorisation
-from ngswell.solve.two_level import EASY, MOST_ITERATIONS, TwoLevelSolver, gmres
+from ngswell.solve.two_level import TOLERANCE, TwoLevelSolver
 
 DILUTION = Ramp((0, 4.1), (80, 2.7))
 
@@ -98,34 +99,52 @@ def test_the_direct_solution(scene):
     for dt in (10.0, 0.1):
         matrix, right = system(problem, state, dt)
         exact = solved(LinearSolver(problem.free), matrix, right)
-        found = solved(TwoLevelSolver(problem), matrix, right)
         size = np.abs(exact / problem.sizes).max()
-        # The preconditioned residual falls by 1e-8; it differs from the error by how good the preconditioner is, which
-        # for forty iterations is a factor of some hundreds.
-        assert np.abs((found - exact) / problem.sizes).max() < 1e-5 * size
-        # Residuals on constrained degrees of freedom are reactions; nothing of them enters the solution.
-        assert not found[~np.array(list(problem.free), bool)].any()
+        for tolerance, most in ((TOLERANCE, 50), (1e-8, 150)):
+            solver = TwoLevelSolver(problem)
+            solver.tolerance = tolerance
+            found = solved(solver, matrix, right)
+            # The preconditioned residual falls by the tolerance; it differs from the error by how good the preconditioner
+            # is, here by up to 70 (order 3). Below 1e-6 it is what single precision leaves of the patches' solves.
+            assert np.abs((found - exact) / problem.sizes).max() < 100 * max(tolerance, 1e-6) * size
+            assert 1 < solver.iterations < most
+            # Residuals on constrained degrees of freedom are reactions; nothing of them enters the solution.
+            assert not found[~np.array(list(problem.free), bool)].any()
 
 
-def test_the_coarse_level_follows_the_step():
-    scene = eighth(5)
-    problem, state = scene.problem, swollen(scene)
+def test_later_solves_begin_from_what_earlier_ones_found():
+    problem = eighth(4).problem
+    problem.initialise()
+    state = problem.initial
+    matrix, right = system(problem, state, 10.0)
     solver = TwoLevelSolver(problem)
-    solved(solver, *system(problem, state, 100.0))
-    assert not solver.with_facets
-    assert solver.iterations < 15
-    # A step a thousand times shorter than h²/[(2µ + λ) K] = 170 s: volume is all but preserved.
-    matrix, right = system(problem, state, 0.01)
-    solved(solver, matrix, right)
-    assert solver.with_facets
-    assert EASY < solver.iterations < MOST_ITERATIONS
-    # A long step is easy again, and the next matrix gets the smaller level.
-    solved(solver, *system(problem, state, 100.0))
-    assert solver.with_facets
-    assert solver.iterations <= EASY
-    solved(solver, *system(problem, state, 100.0))
-    assert not solver.with_facets
-    assert solver.factorisations == 4
+    first = solved(solver, matrix, right)
+    begun = solver.iterations
+    again, solution = right.CreateVector(), right.CreateVector()
+    again.data = 2 * right
+    assert solver.solve(again, solution)
+    assert solver.iterations == 0  # the space holds its solution
+    np.testing.assert_allclose(solution.FV().NumPy(), 2 * first, rtol=1e-9, atol=1e-12)  # round-off
+    solved(solver, matrix, right)  # another factorisation begins anew
+    assert solver.iterations == begun > 3
+    assert (solver.factorisations, solver.solves) == (2, 3)
+
+
+def test_iterations_hardly_depend_on_the_size_and_stay_bounded_in_short_steps():
+    counts = {}
+    for n in (3, 6):
+        problem = eighth(n).problem
+        problem.initialise()
+        strain = homogeneous_equilibrium(TABLE_2, 4.1, "3-d").J ** (1 / 3) - 1
+        problem.fields.components[0].Set(strain * CF((x, y, z)))  # swollen and at rest
+        state = problem.vector.copy()
+        for dt in (100.0, 0.01):
+            solver = TwoLevelSolver(problem)
+            solved(solver, *system(problem, state, dt))
+            counts[n, dt] = solver.iterations
+    assert counts[6, 100.0] < counts[3, 100.0] + 5
+    # A step a ten thousandth of h²/[(2µ + λ) K] = 120 s: volume is all but preserved.
+    assert counts[6, 100.0] < counts[6, 0.01] < 50
 
 
 def test_newtons_method_takes_it():
@@ -143,23 +162,6 @@ def test_newtons_method_takes_it():
     np.testing.assert_allclose(ends[1], ends[0], atol=1e-8)  # Newton's tolerance
 
 
-class _Nothing(BaseMatrix):
-    """No preconditioner at all."""
-
-    def __init__(self, size):
-        super().__init__()
-        self.size = size
-
-    def Height(self):
-        return self.size
-
-    def Width(self):
-        return self.size
-
-    def Mult(self, right, result):
-        result.data = right
-
-
 def test_failures_are_told():
     scene = eighth(2)
     problem, state = scene.problem, swollen(scene)
@@ -167,8 +169,6 @@ def test_failures_are_told():
     solver = TwoLevelSolver(problem)
     with pytest.raises(RuntimeError, match="factorise"):
         solver.solve(right, right.CreateVector())
-    # What the preconditioner is for: forty iterations without one do not solve the system.
-    assert gmres(matrix, _Nothing(problem.space.ndof), problem.sizes, right, right.CreateVector(), 40) is None
     matrix.AsVector().FV().NumPy()[0] = np.nan
     assert not solver.factorise(matrix)
 
@@ -191,5 +191,6 @@ def test_runs_take_the_two_level_solver():
         scene.run(80.0, Adaptive(1e-2), [volume], resume=rest, solver=solver)
         volumes.append(volume.values)
     assert len(volumes[0]) == len(volumes[1])  # the same steps
-    assert volumes[0] == pytest.approx(volumes[1], rel=1e-8)  # GMRES to 1e-8 of each correction
+    # Both solve to 2e-3 of the tolerance of each step's error, 1e-2 of the largest change.
+    assert volumes[0] == pytest.approx(volumes[1], rel=2e-5)
     assert np.abs(volumes[0] / volumes[0][0] - 1).max() > 1e-3
