@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 from math import inf
 
 from ngsolve import BaseVector
-from numpy.typing import NDArray
 
 from ngswell import checks
 from ngswell.errors import Failure, Reason
@@ -14,6 +13,7 @@ from ngswell.problem.admissible import Violation
 from ngswell.problem.problem import Problem
 from ngswell.solve.factorisation import Factorisation
 from ngswell.solve.search import search
+from ngswell.solve.size import Size
 
 ROUND_OFF = 1e-13
 """Share of a reference size that no correction is asked to be below for the sake of small `shares`."""
@@ -108,6 +108,7 @@ class _Iteration:
         vectors = (problem.fields.vec.CreateVector() for _ in range(5))
         self.residual, self.correction, self.simplified, self._gap, self._start = vectors
         self.correction[:] = 0.0
+        self._size, self._wanted_size = Size(problem, problem.references), Size(problem, self.wanted)
         self.count = 0
         self.beyond: Violation | None = None  # what the last correction would leave the physical range with
 
@@ -220,19 +221,14 @@ class _Iteration:
 
     def _converged(self, change: BaseVector, fresh: bool = False) -> bool:
         """Whether what is left after a correction, of a `fresh` matrix the correction itself, is below the tolerance."""
-        size = self._size(change, self.wanted)
+        size = self._wanted_size(change)
         return (size if fresh else self.factorisation.left(size)) <= self.method.tolerance
 
     def _is_round_off(self) -> bool:
         """Whether a correction that nothing reduces is what round-off leaves of unknowns next to nothing."""
         left, tolerance = self.problem.round_off, self.method.tolerance
         units = {name: max(unit, left.get(name, 0.0) / tolerance) for name, unit in self.wanted.items()}
-        return self._size(self.correction, units) <= tolerance
-
-    def _size(self, change: BaseVector, units: dict[str, float] | None = None) -> float:
-        """The largest coefficient of any field, in units of its reference."""
-        problem, values, units = self.problem, change.FV().NumPy(), units or self.problem.references
-        return max(_largest(values[problem.ranges[name]]) / units[name] for name in problem.names)
+        return Size(self.problem, units)(self.correction) <= tolerance
 
     def _success(self) -> Outcome:
         violation = self.problem.admissible.violation(solution=True)
@@ -243,8 +239,3 @@ class _Iteration:
 
     def _failed(self, reason: Reason, what: str = "") -> Outcome:
         return Outcome(self.count, Failure(reason, *self.problem.worst(self.correction.FV().NumPy()), what))
-
-
-def _largest(values: NDArray) -> float:
-    """max |values|, without a copy."""
-    return max(float(values.max()), -float(values.min()))

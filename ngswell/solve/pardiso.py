@@ -123,20 +123,22 @@ class _System:
         self.values, self.right, self.solution = part.values, part.right, part.solution
         self._handle, self.parameters = np.zeros(64, np.int64), np.zeros(64, np.int32)
         self.parameters[list(PARAMETERS)] = list(PARAMETERS.values())
+        one, self._phase, self._error = byref(c_int(1)), c_int(), c_int()
+        self._arguments = (
+            *(at(self._handle), one, one, byref(c_int(UNSYMMETRIC)), byref(self._phase), byref(c_int(self._size))),
+            *(at(self.values), at(self._starts), at(self._columns), None, one, at(self.parameters)),
+            *(byref(c_int(0)), at(self.right), at(self.solution), byref(self._error)),
+        )
 
     def call(self, phase: int, threads: int = 1) -> bool:
         """One phase; False where Pardiso tells of an error. Solves are too short for more than one thread."""
         if not self._size:
             return True
-        one, error = byref(c_int(1)), c_int(0)
+        self._phase.value, self._error.value = phase, 0
         before = self._mkl.MKL_Set_Num_Threads_Local(threads)
-        self._mkl.pardiso(
-            *(at(self._handle), one, one, byref(c_int(UNSYMMETRIC)), byref(c_int(phase)), byref(c_int(self._size))),
-            *(at(self.values), at(self._starts), at(self._columns), None, one, at(self.parameters)),
-            *(byref(c_int(0)), at(self.right), at(self.solution), byref(error)),
-        )
+        self._mkl.pardiso(*self._arguments)
         self._mkl.MKL_Set_Num_Threads_Local(before)
-        return error.value == 0
+        return self._error.value == 0
 
     @property
     def perturbed(self) -> bool:

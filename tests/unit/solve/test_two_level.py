@@ -191,6 +191,6 @@ def test_runs_take_the_two_level_solver():
         scene.run(80.0, Adaptive(1e-2), [volume], resume=rest, solver=solver)
         volumes.append(volume.values)
     assert len(volumes[0]) == len(volumes[1])  # the same steps
-    # Both solve to 2e-3 of the tolerance of each step's error, 1e-2 of the largest change.
+    # Nonlinear solves leave at most 5e-4 of the largest change, which is some 2 % of the volume.
     assert volumes[0] == pytest.approx(volumes[1], rel=2e-5)
     assert np.abs(volumes[0] / volumes[0][0] - 1).max() > 1e-3
