@@ -7,6 +7,8 @@ Displacement of order k, P and c̃ of order k − 1 (baths are exact Dirichlet v
 
 from __future__ import annotations
 
+from importlib import metadata
+
 import numpy as np
 from ngsolve import (
     CF,
@@ -51,6 +53,15 @@ from studies.rivals.block import (
     charge,
 )  # fmt: skip
 from studies.rivals.integrate import serve
+
+
+def solver() -> str:
+    """Pardiso where MKL is installed, else UMFPACK."""
+    try:
+        metadata.version("mkl")
+    except metadata.PackageNotFoundError:
+        return "umfpack"
+    return "pardiso"
 
 
 class NGSolveBlock:
@@ -170,7 +181,7 @@ class NGSolveBlock:
         self.fields.vec.FV().NumPy()[:] = state
         self.form.AssembleLinearization(self.fields.vec)
         if self.inverse is None:
-            self.inverse = self.form.mat.Inverse(self.coupling, inverse="pardiso")
+            self.inverse = self.form.mat.Inverse(self.coupling, inverse=solver())
         else:
             self.inverse.Update()
 
