@@ -192,7 +192,8 @@ def draw(costs: Sequence[IterationCost], cells: Sequence[tuple[int, int]]) -> Fi
             ax.bar(range(len(mine)), heights, 0.5, bottom, color=shade, hatch=hatch, edgecolor="k", lw=0.4, label=part)
             bottom = [low + height for low, height in zip(bottom, heights, strict=True)]
         ax.plot(range(len(mine)), [c.found()["iteration_ms"] for c in mine], "kD", mfc="w", label="mean of the run")
-        ax.set_xticks(range(len(mine)), [c.model.capitalize() + ", C++" * c.compiled for c in mine], fontsize=7)
+        labels = [f"{c.model.capitalize()}\n{'C++' if c.compiled else 'bytecode'}" for c in mine]
+        ax.set_xticks(range(len(mine)), labels, fontsize=8)
         ax.set(title=f"{nx} × {ny} cells", ylabel="time of an iteration [ms]", xlim=(-0.6, len(mine) - 0.4))
         ax.grid(False, axis="x")
     letter_panels(axes)
