@@ -495,8 +495,8 @@ def draw(comparison: Comparison) -> Figure:
         if pressures is not None:
             right.loglog(curve.seconds, pressures, **style)
     if comparison.plain:
-        right.annotate("the plain script writes no pressures", (0.97, 0.95), xycoords="axes fraction", fontsize=8,
-                       ha="right", va="top", color="0.35")  # fmt: skip
+        right.annotate("the plain script writes no pressures", (0.97, 0.12), xycoords="axes fraction", fontsize=8,
+                       ha="right", va="bottom", color="0.35")  # fmt: skip
     apart = {"color": "0.4", "lw": 0.9, "ls": (0, (1, 3))}
     left.axhline(comparison.kept.area_error, label="what two references differ by", **apart)
     right.axhline(comparison.kept.pressure_error, **apart)
