@@ -15,6 +15,7 @@ from ngswell.mesh.points import rules, vertices, vertices_of
 from ngswell.models.model import BathFields, FieldContext
 from ngswell.models.one_number import OneNumber
 from ngswell.problem.lumping import Storage
+from ngswell.problem.per_unknown import of_coefficients
 from ngswell.schedules import Clock, Schedule
 from ngswell.setup.displacements import Held
 from ngswell.setup.loads import followed
@@ -124,10 +125,7 @@ class Discretisation:
     @cached_property
     def sizes(self) -> NDArray:
         """The reference size of every coefficient."""
-        sizes = np.empty(self.space.ndof)
-        for name, reference in self.references.items():
-            sizes[self.ranges[name]] = reference
-        return sizes
+        return of_coefficients(self.ranges, self.references)
 
     def worst(self, vector: NDArray) -> tuple[str, tuple[float, ...]]:
         """The unknown with the largest entry of `vector` in units of its reference, and the vertex [mm] where it is."""

@@ -85,14 +85,14 @@ class Form:
 
     def _bodies(self, terms: Sequence[Term]) -> tuple[list[tuple[Body, dict[str, BitArray]]], list[Term]]:
         """Terms over the body together, with where they are integrated, and those that stay apart."""
-        apart = [term for term in terms if term.apart]
-        joined = [term for term in terms if not term.apart]
+        apart, joined = [term for term in terms if term.apart], [term for term in terms if not term.apart]
         try:
             return self._joined(joined), apart
         except NotDerivable:
-            derivable = [self._is_derivable(term) for term in joined]
-        apart += [term for term, yes in zip(joined, derivable, strict=True) if not yes]
-        return self._joined([term for term, yes in zip(joined, derivable, strict=True) if yes]), apart
+            derivable: list[Term] = []
+            for term in joined:
+                (derivable if self._is_derivable(term) else apart).append(term)
+        return self._joined(derivable), apart
 
     def _is_derivable(self, term: Term) -> bool:
         try:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from ngsolve import BaseVector
 
+from ngswell.problem.per_unknown import of_coefficients
 from ngswell.problem.problem import Problem
 
 
@@ -12,9 +13,7 @@ class Size:
     """The largest coefficient of a vector, in `units` of each unknown."""
 
     def __init__(self, problem: Problem, units: dict[str, float]) -> None:
-        self._units, self._work = np.empty(problem.space.ndof), np.empty(problem.space.ndof)
-        for name, unit in units.items():
-            self._units[problem.ranges[name]] = unit
+        self._units, self._work = of_coefficients(problem.ranges, units), np.empty(problem.space.ndof)
 
     def __call__(self, vector: BaseVector) -> float:
         np.abs(vector.FV().NumPy(), out=self._work)
