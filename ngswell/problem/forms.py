@@ -68,24 +68,24 @@ class Form:
     def _made(self, together: Callable[[Body, dict[str, BitArray]], SumOfIntegrals], condense: bool = False) -> BilinearForm:
         """A bilinear form of the terms, those over the body `together` but for those that stay apart."""
         result = BilinearForm(self._discretisation.space, condense=condense)
-        inside = [term for term in self._terms if term.boundary is None]
-        bodies, apart = self._bodies(inside)
+        bodies, apart = self._bodies
         with _symbolic():
             for body, where in bodies:
                 result += together(body, where)
         for term in apart:
             result += self._over_body(term)
-        for term in inside:
-            if term.lumps:
-                result += self._at_corners(term)
         for term in self._terms:
             if term.boundary is not None:
                 result += self._over_boundary(term)
+            elif term.lumps:
+                result += self._at_corners(term)
         return result
 
-    def _bodies(self, terms: Sequence[Term]) -> tuple[list[tuple[Body, dict[str, BitArray]]], list[Term]]:
+    @cached_property
+    def _bodies(self) -> tuple[list[tuple[Body, dict[str, BitArray]]], list[Term]]:
         """Terms over the body together, with where they are integrated, and those that stay apart."""
-        apart, joined = [term for term in terms if term.apart], [term for term in terms if not term.apart]
+        inside = [term for term in self._terms if term.boundary is None]
+        apart, joined = [term for term in inside if term.apart], [term for term in inside if not term.apart]
         try:
             return self._joined(joined), apart
         except NotDerivable:
