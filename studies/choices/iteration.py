@@ -22,7 +22,6 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from statistics import median
 from time import process_time
 
 import matplotlib.pyplot as plt
@@ -34,6 +33,7 @@ from ngswell import Adaptive, Concentration, Potential, Progress, Result, Scene
 from ngswell.models.model import Model
 from ngswell.solve.direct import solver_of
 from studies.output import Findings, cost, letter_panels
+from studies.rivals.turns import milliseconds
 from studies.rivals.worker import ABSENT, add_dolfinx, kernels, machine, usable
 from studies.scenes import INITIAL, free_swelling_block, with_model
 
@@ -167,13 +167,7 @@ def alone(scene: Scene, result: Result, turns: int) -> dict[str, float]:
             "factorise": lambda: solver.factorise(matrix),
             "solve": lambda: solver.solve(residual, correction),
         }
-        taken: dict[str, list[float]] = {name: [] for name in parts}
-        for _ in range(turns):
-            for name, part in parts.items():
-                clock = process_time()
-                part()
-                taken[name].append(1e3 * (process_time() - clock))
-    return {name: median(times) for name, times in taken.items()}
+        return milliseconds(parts, turns)
 
 
 FILLS = (("0.15", ""), ("0.95", ""), ("0.35", ""), ("0.6", "////"), ("0.85", "...."))

@@ -16,8 +16,6 @@ import logging
 import os
 import sys
 from collections.abc import Callable
-from statistics import median
-from time import process_time
 from typing import Any
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -51,6 +49,7 @@ from studies.rivals.block import (
     charge,
 )  # fmt: skip
 from studies.rivals.integrate import serve
+from studies.rivals.turns import milliseconds
 
 FLAGS = ["-O3", "-march=native"]
 
@@ -248,14 +247,8 @@ def kernels(cells: tuple[int, int], model: str, turns: int = 7) -> dict[str, flo
         "factorise": block.factorise_matrix,
         "solve": lambda: block.solve(residual),
     }
-    taken: dict[str, list[float]] = {name: [] for name in actions}
-    for _ in range(turns):
-        for name, action in actions.items():
-            clock = process_time()
-            action()
-            taken[name].append(1e3 * (process_time() - clock))
     return {
-        **{f"{name}_ms": median(times) for name, times in taken.items()},
+        **{f"{name}_ms": taken for name, taken in milliseconds(actions, turns).items()},
         "unknowns": block.unknowns,
         "points": (block.grid.order + 2) ** 2,
     }
