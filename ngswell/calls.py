@@ -8,11 +8,14 @@ import warnings
 from collections.abc import Callable
 from difflib import get_close_matches
 from functools import wraps
+from threading import RLock
 from typing import Any, TypeVar
 
 from ngswell.errors import InputError
 
 Thing = TypeVar("Thing")
+
+Function = TypeVar("Function", bound=Callable[..., Any])
 
 _PACKAGE = __name__.partition(".")[0]
 
@@ -24,6 +27,20 @@ def warn(warning: Warning) -> None:
     while frame.f_back is not None and frame.f_globals.get("__name__", "").partition(".")[0] == _PACKAGE:
         frame, level = frame.f_back, level + 1
     warnings.warn(warning, stacklevel=level)
+
+
+_TURN = RLock()
+
+
+def in_turn(function: Function) -> Function:
+    """A function that computes in one thread at a time, as NGSolve's calls share memory and settings within a process."""
+
+    @wraps(function)
+    def call(*arguments: Any, **named: Any) -> Any:
+        with _TURN:
+            return function(*arguments, **named)
+
+    return call  # type: ignore[return-value]
 
 
 def refusing(thing: Thing) -> Thing:

@@ -12,6 +12,7 @@ from typing import Any
 from ngswell import checks
 from ngswell.analysis.one_step import Growth, growth_factor
 from ngswell.baths.bath import Bath
+from ngswell.calls import in_turn
 from ngswell.errors import InputError
 from ngswell.observers.base import Observer
 from ngswell.observers.records import power_of_mm, product
@@ -61,13 +62,16 @@ class Scene(Setup):
         return self._problem
 
     @cached_property
+    @in_turn
     def _problem(self) -> Problem:
         return Problem(self)
 
+    @in_turn
     def state(self, snapshot: Snapshot) -> Any:
         """The model's state at a snapshot: `scene.state(scene.equilibrate()).at((1.1, 0.5), "J")`. No run changes it."""
         return Discretisation(self).state_at(snapshot)
 
+    @in_turn
     def after(
         self,
         end: Result | Snapshot,

@@ -10,6 +10,7 @@ from ngsolve import GridFunction
 from numpy.typing import NDArray
 
 from ngswell import checks
+from ngswell.calls import in_turn
 from ngswell.errors import NgswellError
 from ngswell.problem.problem import Problem
 from ngswell.setup.setup import Setup
@@ -41,6 +42,7 @@ class Growth:
     mode: GridFunction
 
 
+@in_turn
 def growth_factor(
     setup: Setup, dt: float, state: Snapshot | None = None, tolerance: float = 1e-6, most_steps: int = 1000
 ) -> Growth:

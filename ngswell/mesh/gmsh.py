@@ -15,6 +15,7 @@ from ngsolve import Mesh
 from numpy.typing import NDArray
 
 from ngswell import checks
+from ngswell.calls import in_turn
 from ngswell.errors import InputError, place
 from ngswell.mesh.shapes import check_named, check_plane
 from ngswell.mesh.soundness import check_mesh
@@ -49,6 +50,7 @@ Groups = dict[tuple[int, str, str], NDArray]
 """(dimension, shape, name of the physical group) → corners of its cells, one row each."""
 
 
+@in_turn
 def read_mesh(path: str | Path) -> Mesh:
     """Read a 2-d or 3-d mesh in mm from a Gmsh file (.msh, version 2.2 or 4.1) of straight cells. Needs meshio.
 

@@ -14,6 +14,7 @@ from ngsolve.meshes import Make1DMesh, MakeStructured2DMesh, MakeStructured3DMes
 from numpy.typing import NDArray
 
 from ngswell import checks
+from ngswell.calls import in_turn
 from ngswell.errors import InputError
 from ngswell.mesh.soundness import check_mesh
 from ngswell.mesh.spacing import Grade, Lines, Regions, coordinates, places, thinnings, with_regions
@@ -28,6 +29,7 @@ MOST_THINNING = 100.0
 """Ratio that `grade` may have on a shape, whose thin cells are thin in all directions."""
 
 
+@in_turn
 def column(
     height: float,
     cells: int,
@@ -53,6 +55,7 @@ def column(
     return with_regions("column", mesh, at, regions)
 
 
+@in_turn
 def ray(
     inner: float,
     outer: float,
@@ -78,6 +81,7 @@ def ray(
     return with_regions("ray", mesh, at, regions, "r")
 
 
+@in_turn
 def rectangle(
     width: float,
     height: float,
@@ -105,6 +109,7 @@ def rectangle(
     return with_regions("rectangle", mesh, at, regions)
 
 
+@in_turn
 def box(
     width: float,
     depth: float,
@@ -142,6 +147,7 @@ def box(
     return with_regions("box", mesh, at, regions)
 
 
+@in_turn
 def from_occ(shape: Any, maxh: float, order: int = 1, quads: bool = False, grade: Grade | None = None) -> Mesh:
     """Mesh a shape of `netgen.occ` in mm: a face in the plane z = 0 with named edges, or a solid with named faces.
 

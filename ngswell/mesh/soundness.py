@@ -9,6 +9,7 @@ import numpy as np
 from ngsolve import ET, VERTEX, VOL, ElementId, IntegrationRule, Mesh, NodeId, specialcf
 from numpy.typing import NDArray
 
+from ngswell.calls import in_turn
 from ngswell.errors import InputError, place
 from ngswell.mesh.parts import Sides, check_hinges
 from ngswell.mesh.points import with_corners
@@ -26,6 +27,7 @@ _AT_ONCE = 20_000
 """Pairs of a side and a point that are looked at together."""
 
 
+@in_turn
 def check_mesh(mesh: Mesh) -> None:
     """Refuse cells that are turned inside out or have no size, meshes that do not conform, and hinges, by place.
 

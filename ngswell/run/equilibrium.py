@@ -11,6 +11,7 @@ from ngswell import checks
 from ngswell.analysis.diagnosis import folded, singular_mode
 from ngswell.analysis.overlap import warn_of_overlap
 from ngswell.baths.treatment import Charge
+from ngswell.calls import in_turn
 from ngswell.errors import UNCONVERGED, Failure, InputError, Reason, StepError
 from ngswell.observers.base import Observer
 from ngswell.problem.problem import Problem
@@ -43,6 +44,7 @@ MOST_STEPS = 300
 """Steps that relaxation tries. To rest it takes some 30 to 60; without a state of rest it might creep on for ever."""
 
 
+@in_turn
 def equilibrate(
     setup: Setup,
     time: float | None = None,

@@ -13,6 +13,7 @@ from threadpoolctl import threadpool_limits
 from ngswell import checks
 from ngswell.analysis.diagnosis import explain
 from ngswell.analysis.overlap import OverlapWatch
+from ngswell.calls import in_turn
 from ngswell.errors import InstabilityError, StepError
 from ngswell.observers.base import Observer
 from ngswell.problem.problem import Problem
@@ -36,6 +37,7 @@ from ngswell.stepping.steps import Control
 from ngswell.streams import CSV
 
 
+@in_turn
 def run(
     setup: Setup,
     until: float,

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from ngswell import checks
 from ngswell.baths.bath import Bath, checked_salt, default_treatment
 from ngswell.baths.treatment import Charge, Prescribed, Treatment, Weak
+from ngswell.calls import in_turn
 from ngswell.errors import InputError
 from ngswell.mesh.parts import Sides
 from ngswell.mesh.points import digest, points, vertices_of
@@ -59,6 +60,7 @@ class Setup:
     compiled: bool = False
     _made_with: dict[str, NDArray] = field(init=False, repr=False, compare=False)
 
+    @in_turn
     def __post_init__(self) -> None:
         self._check_kinds()
         if self.kinematics.dimension != self.mesh.dim:
