@@ -130,6 +130,8 @@ class Scene(Setup):
             lines.append(f"  {type(one.support).__name__} on {one.boundary}: {how} along {one.direction}")
         lines += [f"  {name}: {law}" for name, law in self.material.laws().items()]
         lines.append(f"  threads: {threads_said(problem)}")
+        if not problem.team.alone:
+            lines.append(f"  {problem.share.describe(problem.space)}")
         if self.compiled:
             missing = why_not()
             lines.append("  terms: " + ("compiled to C++" if missing is None else f"bytecode ({missing})"))

@@ -18,7 +18,7 @@ from matplotlib.figure import Figure
 
 from ngswell import OutputError, Result, __version__
 from ngswell.files import check_folder, replacing
-from ngswell.solve.direct import best_solver
+from ngswell.solve.factors import best_solver
 
 SUFFIXES = (".png", ".csv", ".json")
 

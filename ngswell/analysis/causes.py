@@ -90,7 +90,7 @@ def outrun(problem: Problem, snapshot: Snapshot, dt: float, failure: Failure) ->
     else:
         problem.restore(snapshot)
         problem.begin_step(time + dt, dt, charge_share=(1 - SLACK) * now / then)
-        outcome = DampedNewton().solve(problem, Factorisation(LinearSolver(problem.free)))
+        outcome = DampedNewton().solve(problem, Factorisation(LinearSolver(problem.free, team=problem.team)))
         problem.restore(snapshot)
         if outcome.failure is not None:
             return None

@@ -7,6 +7,7 @@ from enum import Enum
 
 import numpy as np
 from netgen.meshing import NgException
+from ngsolve.la import SparseMatrixd
 from numpy.typing import NDArray
 
 from ngswell.analysis.causes import anions_are_spent, imbalance, oscillating, outrun, released
@@ -88,16 +89,16 @@ def singular_mode(problem: Problem) -> Undetermined | None:
 
     A solve with a matrix that is singular to round-off gives its null vector, times something large.
     """
-    matrix = problem.linearise()
-    rows, columns, values = (np.array(part) for part in matrix.COO())
+    rows, columns, values = _entries(problem)
     if not np.isfinite(values).all():
         return None
     free = np.array(list(problem.free))
     size = problem.sizes
     shares = np.where(free[rows] & free[columns], values * size[columns], 0.0)
     could = np.bincount(rows, np.abs(shares), len(free))
-    # Some factorisations refuse what is singular; entries are in the order of COO.
-    matrix.AsVector().FV().NumPy()[rows == columns] += 1e-13 * (could / size)[rows[rows == columns]]
+    # Some factorisations refuse what is singular.
+    raised = np.where(rows == columns, values + 1e-13 * (could / size)[rows], values)
+    matrix = SparseMatrixd.CreateFromCOO(rows, columns, raised, len(free), len(free))
     x, right = problem.fields.vec.CreateVector(), problem.fields.vec.CreateVector()
     mode = np.random.default_rng(0).standard_normal(len(free)) * free
     try:
@@ -115,6 +116,15 @@ def singular_mode(problem: Problem) -> Undetermined | None:
     if (np.abs(left) > NONE_LEFT * could).any():
         return None
     return _described(problem, size * mode)
+
+
+def _entries(problem: Problem) -> tuple[NDArray, NDArray, NDArray]:
+    """Rows, columns and values of the entries of the present step's matrix, over all ranks."""
+    shares = problem.team.each([np.array(part) for part in problem.linearise().COO()])
+    rows, columns, values = (np.concatenate(parts) for parts in zip(*shares, strict=True))
+    size = problem.space.ndof
+    entries, places = np.unique(rows.astype(np.int64) * size + columns, return_inverse=True)
+    return (entries // size).astype(np.int32), (entries % size).astype(np.int32), np.bincount(places, values)
 
 
 def _described(problem: Problem, mode: NDArray) -> Undetermined:

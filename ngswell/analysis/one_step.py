@@ -76,7 +76,7 @@ def _linearised_step(problem: Problem, time: float, dt: float, scale: NDArray) -
     """δx_old → δx_new about the step of size `dt` from the problem's fields at `time`; `scale` is the size of unknowns."""
     residual, change = problem.fields.vec.CreateVector(), problem.fields.vec.CreateVector()
     old = problem.vector.copy()
-    solver = LinearSolver(problem.free)
+    solver = LinearSolver(problem.free, team=problem.team)
     problem.begin_step(time + dt, dt)
     failure = DampedNewton().solve(problem, Factorisation(solver)).failure
     if failure is not None:

@@ -74,7 +74,11 @@ class Perturbations:
         if solver is None:
             whole = problem.reaches_inside
             self._system = problem.form(problem.terms, 1 / problem.dt, condense=not whole)
-            solver = LinearSolver(problem.free) if whole else CondensedSolver(self._system, problem.free)
+            solver = (
+                LinearSolver(problem.free, team=problem.team)
+                if whole
+                else CondensedSolver(self._system, problem.free, team=problem.team)
+            )
         self._solver = solver
         trial, test = problem.space.TnT()
         product = InnerProduct(Grad(trial[0]), Grad(test[0])) * problem.kinematics.weight
@@ -196,7 +200,9 @@ class Perturbations:
         shift, first = low, mode
         for _ in range(5):
             self._factorise(shift)
-            response = self._respond(self._product(rates, mode))
+            content = self._product(rates, mode)
+            self.problem.team.sum_values(content)
+            response = self._respond(content)
             scaled, old = response / scale, mode / scale
             inverse = float(scaled @ old / (old @ old))
             rate = shift - 1 / inverse

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from ngsolve import BND, CF, ET, H1, VOL, BitArray, Compress, FESpace, GridFunction, IntegrationRule, NumberSpace
@@ -16,11 +16,14 @@ from ngswell.models.model import BathFields, FieldContext
 from ngswell.models.one_number import OneNumber
 from ngswell.problem.lumping import Storage
 from ngswell.problem.per_unknown import of_coefficients
+from ngswell.problem.share import Share
+from ngswell.problem.tie import Tie
 from ngswell.schedules import Clock, Schedule
 from ngswell.setup.displacements import Held
 from ngswell.setup.loads import followed
 from ngswell.setup.setup import Setup
 from ngswell.setup.snapshot import Snapshot
+from ngswell.team import team_of
 
 BONUS_ORDER = 2
 """Extra integration order: the pulled-back terms are rational in F."""
@@ -28,13 +31,6 @@ BONUS_ORDER = 2
 
 ROUND_OFF = 1e-12
 """What a held displacement may be off by, in units of its reference, and count as held."""
-
-
-class Tie(NamedTuple):
-    """Coefficients of the displacement that are one number, and the force over time that moves it."""
-
-    dofs: NDArray
-    force: Schedule
 
 
 class Discretisation:
@@ -47,6 +43,7 @@ class Discretisation:
         setup.mesh_shape.check(setup.mesh)
         self.setup = setup
         self.mesh, self.model, self.kinematics = setup.mesh, setup.model, setup.kinematics
+        self.team = team_of(setup.ranks)
         prescribed = "|".join(bath.boundary for bath, _ in setup.prescribed_baths)
         self.space: FESpace = self.model.space(self.mesh, self.kinematics, setup.fixed(), prescribed)
         self.names: tuple[str, ...] = self.model.unknowns
@@ -88,7 +85,12 @@ class Discretisation:
     @cached_property
     def storage(self) -> Storage:
         """Where contents are lumped."""
-        return Storage(self.mesh, self.kinematics.weight)
+        return Storage(self.mesh, self.kinematics.weight, self.share.cells)
+
+    @cached_property
+    def share(self) -> Share:
+        """What this rank integrates over."""
+        return Share(self.mesh, self.team)
 
     @property
     def largest_charge(self) -> float:

@@ -7,7 +7,8 @@ from contextlib import contextmanager
 from functools import cached_property
 from typing import Any
 
-from ngsolve import BaseMatrix, BaseVector, BilinearForm, BitArray, Variation, ds, dx, ngsglobals
+from netgen.meshing import NgException
+from ngsolve import BaseMatrix, BaseVector, BilinearForm, BitArray, SymbolicEnergy, ds, dx, ngsglobals
 from ngsolve.comp import SumOfIntegrals
 
 from ngswell.models.term import Kind, Role, Term
@@ -36,17 +37,28 @@ class Form:
     ) -> None:
         self.condense, self._fields = condense, unknowns.fields
         self._discretisation, self._unknowns, self._rates = discretisation, unknowns, rates
+        self._share = discretisation.share
         self._terms = terms
         self._compile = cpp if often and discretisation.setup.compiled else bytecode
 
     def apply(self, result: BaseVector) -> None:
         """The form at the present fields, on all degrees of freedom."""
         self._applied.Apply(self._fields.vec, result)
+        self._share.team.sum(result)
 
     def linearise(self) -> BaseMatrix:
-        """Its derivative at the present fields."""
-        with _symbolic():
-            self.linearised.AssembleLinearization(self._fields.vec)
+        """Its derivative at the present fields: of ranks the share of each, which their sum is made of.
+
+        Raises NgException on all ranks where a cell's own unknowns cannot be eliminated.
+        """
+        failed: NgException | None = None
+        try:
+            with _symbolic():
+                self.linearised.AssembleLinearization(self._fields.vec)
+        except NgException as error:
+            failed = error
+        if self._share.team.any(failed is not None):
+            raise failed or NgException("a matrix cannot be made on another rank")
         return self.linearised.mat
 
     @cached_property
@@ -115,7 +127,7 @@ class Form:
         return bytecode if where.get("definedonelements") is self._discretisation.storage.lumped else self._compile
 
     def _dx(self, where: dict[str, BitArray]) -> Any:
-        return dx(intrules=self._discretisation.rules, **where)
+        return dx(intrules=self._discretisation.rules, **(where or self._share.over_body))
 
     @property
     def _weight(self) -> Any:
@@ -123,16 +135,24 @@ class Form:
 
     def _over_body(self, term: Term) -> Any:
         where = {"definedonelements": self._discretisation.storage.integrated} if term.lumps else {}
-        integral = self._integrand(term, self._weight) * self._dx(where)
-        return Variation(integral) if term.kind is Kind.ENERGY else integral
+        integrand = self._integrand(term, self._weight)
+        if term.kind is not Kind.ENERGY:
+            return integrand * self._dx(where)
+        energy = SymbolicEnergy(integrand, definedonelements=self._share.cells)  # Variation forgets the elements
+        for shape, rule in self._discretisation.rules.items():
+            energy.SetIntegrationRule(shape, rule)
+        return energy
 
     def _over_boundary(self, term: Term) -> SumOfIntegrals:
         mesh = self._discretisation.mesh
         region = mesh.Boundaries(term.boundary)
         # At the ends of a 1-d mesh NGSolve's normal points outwards as seen from the cell only.
         in_cells = term.normal_derivatives or (mesh.dim == 1 and term.role is Role.LOAD)
-        integrand = self._integrand(term, self._weight)
-        return integrand * ds(definedon=region, bonus_intorder=BONUS_ORDER, skeleton=in_cells)
+        integrand, share = self._integrand(term, self._weight), self._share
+        if in_cells and share.factor is not None:
+            integrand = share.factor * integrand
+        where = {} if in_cells else share.over_sides
+        return integrand * ds(definedon=region, bonus_intorder=BONUS_ORDER, skeleton=in_cells, **where)
 
     def _at_corners(self, term: Term) -> SumOfIntegrals:
         """A content that is lumped: at a corner no other function than that of its vertex is there."""

@@ -29,7 +29,8 @@ gradients are not defined at their tips."""
 
 
 class Storage:
-    """In which cells contents are integrals, and in which they are lumped at the corners; it starts with none of these.
+    """In which of a rank's `cells` contents are integrals, and in which they are lumped at the corners; it starts with none
+    of these.
 
     In steps Δt < h²/(6 κ) what the integrals ask of linear fields after a jump at a boundary alternates from node to node,
     and next to nothing it is negative. Lumped contents do neither, to second order in the cell; but a jump then fills all
@@ -39,24 +40,26 @@ class Storage:
     Functions inside cells and on their sides hold nothing at corners: in lumped cells they follow at once.
     """
 
-    def __init__(self, mesh: Mesh, weight: CoefficientFunction | float) -> None:
+    def __init__(self, mesh: Mesh, weight: CoefficientFunction | float, cells: BitArray) -> None:
         self.vertex_weights = vertex_weights(mesh, weight)
         self.integrated, self.lumped = BitArray(mesh.ne), BitArray(mesh.ne)
         self._can_be = BitArray([cell.type in VERTEX_RULES for cell in mesh.Elements(VOL)])
+        self._cells = cells
         self.lump(False)
 
     @property
     def is_lumped(self) -> bool:
         """Whether any contents are lumped."""
-        return self.lumped.NumSet() > 0
+        return self._wanted and self._can_be.NumSet() > 0
 
     def lump(self, wanted: bool) -> None:
         """Lump contents in all cells that are not pyramids, or in none."""
+        self._wanted = wanted
         self.lumped.Clear()
         if wanted:
-            self.lumped |= self._can_be
+            self.lumped |= self._can_be & self._cells
         self.integrated.Set()
-        self.integrated &= ~self.lumped
+        self.integrated &= self._cells & ~self.lumped
 
 
 def vertex_weights(mesh: Mesh, weight: CoefficientFunction | float) -> GridFunction:

@@ -21,7 +21,7 @@ from ngswell.run.watch import Watch
 from ngswell.schedules import LARGEST
 from ngswell.setup.setup import Setup
 from ngswell.setup.snapshot import Snapshot
-from ngswell.solve.direct import LinearSolver, solver_of
+from ngswell.solve.direct import LinearSolver, checked_solver, solver_of
 from ngswell.solve.factorisation import Factorisation
 from ngswell.solve.newton import DampedNewton, Outcome
 
@@ -75,7 +75,7 @@ def equilibrate(
     watch, problem, method = Watch(observers), Problem(setup), newton or DampedNewton()
     watch.plan(time, time)
     solved = _with_sums(problem)
-    rest = _Rest(solved, time, method, Factorisation(solver(solved), method.slowest))
+    rest = _Rest(solved, time, method, Factorisation(checked_solver(solver, solved), method.slowest))
     failed = rest.raise_charge()
     if failed is not None and not rest.relax():
         raise failed

@@ -13,7 +13,7 @@ from ngswell.run.digest import canonical_text
 from ngswell.run.guard import Guard
 from ngswell.run.restart import Restart
 from ngswell.setup.setup import Setup
-from ngswell.solve.direct import LinearSolver
+from ngswell.solve.direct import LinearSolver, checked_solver
 from ngswell.solve.newton import DampedNewton
 from ngswell.stepping.schemes import BACKWARD_EULER
 from ngswell.stepping.stepper import Stepper
@@ -66,8 +66,7 @@ class Method:
 
     def stepper(self, problem: Problem, timetable: Timetable, earlier: Restart | None) -> Stepper:
         """The steps from the present fields, as those of the `earlier` part go on."""
-        solver = self.make_solver(problem)
-        checks.instance("what solver makes", solver, LinearSolver, "a LinearSolver, as TwoLevelSolver")
+        solver = checked_solver(self.make_solver, problem)
         stepper = Stepper(problem, timetable, self.control, solver, self.newton)
         if earlier is not None:
             stepper.restore(earlier.stepper, same=earlier.method == self.text(solver))

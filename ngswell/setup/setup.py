@@ -19,6 +19,7 @@ from ngswell.errors import InputError
 from ngswell.mesh.parts import Sides
 from ngswell.mesh.points import digest, points, vertices_of
 from ngswell.mesh.shape import MeshShape
+from ngswell.mesh.shares import check_ranks
 from ngswell.mesh.soundness import check_cells, check_sides
 from ngswell.models.model import Model
 from ngswell.models.potential import Potential
@@ -32,6 +33,7 @@ from ngswell.setup.rigid_motions import check_determined
 from ngswell.setup.snapshot import Snapshot
 from ngswell.setup.supports import Support
 from ngswell.setup.units import check_units
+from ngswell.team import team_of
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,7 +43,8 @@ class Setup:
     The body starts undeformed, in Donnan equilibrium with `initial` (salt concentration [mol/l] and hydraulic
     pressure [N/mm²]; by default that of its baths at `start`, which then have to agree). `charge` multiplies the
     material's cfc0 over time. With an `origin`, which `Scene.after` sets, runs start from its fields instead. `compiled`
-    has the terms over the body compiled to C++ (docs/speed.md). Raises InputError for anything that cannot be meant.
+    has the terms over the body compiled to C++ (docs/speed.md). With `ranks` those that mpirun has started compute it
+    together (docs/distributed.md). Raises InputError for anything that cannot be meant.
     """
 
     mesh: Mesh
@@ -58,6 +61,7 @@ class Setup:
     sides: Sides = field(init=False, repr=False, compare=False)
     origin: Snapshot | None = None
     compiled: bool = False
+    ranks: bool = False
     _made_with: dict[str, NDArray] = field(init=False, repr=False, compare=False)
 
     @in_turn
@@ -109,6 +113,8 @@ class Setup:
             start=checks.number("start", self.start, "s", -LARGEST, LARGEST),
         )
         checks.flag("compiled", self.compiled)
+        checks.flag("ranks", self.ranks)
+        check_ranks(team_of(self.ranks), self.mesh)
         if self.origin is not None:
             checks.instance("origin", self.origin, Snapshot, "a snapshot, such as `result.end`")
             if self.origin.time != self.start:

@@ -3,91 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import cache
-from typing import Protocol
 
 import numpy as np
 from netgen.meshing import NgException
 from ngsolve import BaseMatrix, BaseVector, BitArray
-from ngsolve.la import SparseMatrixd
 from numpy.typing import NDArray
 
+from ngswell import checks
 from ngswell.errors import InputError
-from ngswell.problem.discretisation import Tie
 from ngswell.problem.forms import Form
 from ngswell.problem.problem import Problem
-from ngswell.solve import pardiso, umfpack
-
-
-@cache
-def best_solver() -> str:
-    """Name of the solver: pardiso where MKL is installed (`pip install ngswell[mkl]`), else umfpack."""
-    return "umfpack" if pardiso.library() is None else "pardiso"
-
-
-@cache
-def _why_not(name: str) -> str | None:
-    """Why there is no such solver here, tried on a matrix of one entry; None where there is."""
-    if name == "sparsecholesky" or name.endswith("spd"):
-        return "is for symmetric matrices, which dr/dx is not"
-    if name == "pardiso":
-        return "needs MKL: pip install ngswell[mkl]" if pardiso.library() is None else None
-    one = SparseMatrixd.CreateFromCOO([0], [0], [1.0], 1, 1)
-    try:
-        one.Inverse(inverse=name)
-    except (NgException, ImportError, RuntimeError) as error:
-        return f"is not to be had from this NGSolve ({error})"
-    return None
-
-
-class Factors(Protocol):
-    """Factors of a matrix on its free degrees of freedom."""
-
-    anew: bool
-    """Whether the last factorisation has an analysis of its own, which later ones share."""
-
-    def update(self) -> bool:
-        """Factorise the matrix as it is now; False where it is singular or holds a value that is not finite."""
-
-    def solve(self, right: BaseVector, solution: BaseVector) -> bool:
-        """solution = A⁻¹ right on the free degrees of freedom, 0 elsewhere; False where none is found."""
-
-
-class NGSolveFactors:
-    """Factors by one of the solvers that NGSolve calls itself."""
-
-    def __init__(self, matrix: BaseMatrix, free: BitArray, name: str) -> None:
-        self._matrix, self._free, self._name = matrix, free, name
-        self._inverse: BaseMatrix | None = None
-        self.anew = False
-
-    def update(self) -> bool:
-        """See `Factors`."""
-        if not np.isfinite(self._matrix.AsVector().FV().NumPy()).all():
-            return False
-        self.anew = self._inverse is None
-        try:
-            if self._inverse is None:
-                self._inverse = self._matrix.Inverse(self._free, inverse=self._name)
-            else:
-                self._inverse.Update()
-        except NgException:
-            self._inverse = None
-            return False
-        return True
-
-    def solve(self, right: BaseVector, solution: BaseVector) -> bool:
-        """See `Factors`."""
-        solution.data = self._inverse * right
-        return True
-
-
-def _factors(name: str, matrix: BaseMatrix, free: BitArray) -> Factors:
-    if name == "pardiso":
-        return pardiso.Pardiso(matrix, free)
-    if name == "umfpack" and umfpack.library() is not None:
-        return umfpack.Umfpack(matrix, free)
-    return NGSolveFactors(matrix, free, name)
+from ngswell.problem.tie import Tie
+from ngswell.solve.factors import Factors, best_solver, factors, why_not
+from ngswell.solve.gathered import Gathered
+from ngswell.team import ALONE, Team
 
 
 class LinearSolver:
@@ -107,9 +36,9 @@ class LinearSolver:
     direct = True
     """Whether the problem is of a size that is factorised as a whole."""
 
-    def __init__(self, free: BitArray, name: str | None = None) -> None:
-        self.name = name or best_solver()
-        if refused := _why_not(self.name):
+    def __init__(self, free: BitArray, name: str | None = None, team: Team = ALONE) -> None:
+        self.name, self.team = name or best_solver(), team
+        if refused := why_not(self.name):
             raise InputError(f"linear solver {self.name!r} {refused}; without a name it is {best_solver()!r}")
         self._free = free
         self._matrix: BaseMatrix | None = None
@@ -120,12 +49,22 @@ class LinearSolver:
     def factorise(self, matrix: BaseMatrix) -> bool:
         """Factorise `matrix`; False if it is singular or holds a value that is not finite."""
         if self._factors is None or matrix is not self._matrix:
-            self._matrix, self._factors = matrix, _factors(self.name, matrix, self._free)
+            self._matrix, self._factors = matrix, self._factors_of(matrix)
         if not self._factors.update():
             self._factors = None
             return False
         self.factorisations += 1
         return True
+
+    def _factors_of(self, matrix: BaseMatrix) -> Factors:
+        if self.team.alone:
+            return factors(self.name, matrix, self._free)
+        return Gathered(matrix, self._free, self.team, lambda whole: factors(self.name, whole, self._free))
+
+    def product(self, vector: BaseVector, result: BaseVector) -> None:
+        """result = A vector, with the matrix of the last factorisation: over all ranks."""
+        result.data = self._matrix * vector
+        self.team.sum(result)
 
     @property
     def analysed_anew(self) -> bool:
@@ -148,7 +87,7 @@ class LinearSolver:
         """Factorise, and find how the free degrees of freedom follow those of `ties`, each of which are one number."""
         if not self.factorise(matrix):
             return False
-        self._ties = Ties(matrix, ties, self.invert) if ties else None
+        self._ties = Ties(self.product, ties, self.invert, matrix.CreateColVector()) if ties else None
         return self._ties is None or self._ties.regular
 
     def solve(self, right: BaseVector, solution: BaseVector, prescribed: BaseVector | None = None) -> bool:
@@ -156,7 +95,9 @@ class LinearSolver:
         moved = right
         if prescribed is not None:
             moved = right.CreateVector()
-            moved.data = right - self._matrix * prescribed
+            self.product(prescribed, moved)
+            moved.data = -1 * moved  # not right - moved, which NGSolve evaluates from the left, in place
+            moved += right
         solved = self.invert(moved, solution)
         if self._ties is not None:
             self._ties.move(moved, solution)
@@ -180,19 +121,25 @@ class Ties:
         x = A_ff⁻¹ b + m q,   tᵀA m q = tᵀ(b − A A_ff⁻¹ b).
     """
 
-    def __init__(self, matrix: BaseMatrix, ties: Sequence[Tie], invert: Callable[[BaseVector, BaseVector], bool]) -> None:
-        self._matrix, self._dofs, self._work = matrix, [tie.dofs for tie in ties], matrix.CreateColVector()
+    def __init__(
+        self,
+        product: Callable[[BaseVector, BaseVector], None],
+        ties: Sequence[Tie],
+        invert: Callable[[BaseVector, BaseVector], bool],
+        work: BaseVector,
+    ) -> None:
+        self._product, self._dofs, self._work = product, [tie.dofs for tie in ties], work
         self._followed: list[NDArray] = []
         stiffness, found = [], True
         for dofs in self._dofs:
-            one, answer = matrix.CreateColVector(), matrix.CreateColVector()
+            one, answer = work.CreateVector(), work.CreateVector()
             one[:] = 0.0
             one.FV().NumPy()[dofs] = 1.0
-            self._work.data = matrix * one
-            found &= invert(self._work, answer)
+            product(one, work)
+            found &= invert(work, answer)
             one -= answer
-            self._work.data = matrix * one
-            stiffness.append(self._summed(self._work))
+            product(one, work)
+            stiffness.append(self._summed(work))
             self._followed.append(one.FV().NumPy().copy())
         self._stiffness = np.array(stiffness).T
         self.regular = bool(found and np.isfinite(self._stiffness).all() and np.linalg.det(self._stiffness) != 0)
@@ -203,7 +150,9 @@ class Ties:
 
     def move(self, right: BaseVector, solution: BaseVector) -> None:
         """Add what ties move to a `solution` on the free degrees of freedom."""
-        self._work.data = right - self._matrix * solution
+        self._product(solution, self._work)
+        self._work.data = -1 * self._work
+        self._work += right
         amounts = np.linalg.solve(self._stiffness, self._summed(self._work))
         for amount, followed in zip(amounts, self._followed, strict=True):
             solution.FV().NumPy()[:] += amount * followed
@@ -215,27 +164,43 @@ class CondensedSolver(LinearSolver):
     The factorisation is of their Schur complement: A_bb − A_bi A_ii⁻¹ A_ib.
     """
 
-    def __init__(self, form: Form, free: BitArray, name: str | None = None) -> None:
-        super().__init__(free & form.linearised.space.FreeDofs(True), name)
+    def __init__(self, form: Form, free: BitArray, name: str | None = None, team: Team = ALONE) -> None:
+        super().__init__(free & form.linearised.space.FreeDofs(True), name, team)
         self._form, self._condensed = form, form.linearised
-        self._reduced: BaseVector | None = None
+        self._work: BaseVector | None = None
 
     def linearise(self, problem: Problem) -> BaseMatrix:
         return self._form.linearise()
 
     def solve(self, right: BaseVector, solution: BaseVector, prescribed: BaseVector | None = None) -> bool:
-        if self._reduced is None:
-            self._reduced = right.CreateVector()
-        self._reduced.data = right
-        self._reduced.data += self._condensed.harmonic_extension_trans * right
-        solved = super().solve(self._reduced, solution, prescribed)
-        solution.data += self._condensed.inner_solve * right
-        solution.data += self._condensed.harmonic_extension * solution
+        if self._work is None:
+            self._work = right.CreateVector()
+        work = self._work
+        work.data = self._condensed.harmonic_extension_trans * right
+        self.team.sum(work)
+        work.data += right
+        solved = super().solve(work, solution, prescribed)
+        work.data = self._condensed.inner_solve * right
+        work.data += self._condensed.harmonic_extension * solution
+        self.team.sum(work)
+        solution.data += work
         return solved and bool(np.isfinite(solution.FV().NumPy()).all())
 
 
 def solver_of(problem: Problem) -> LinearSolver:
     """The solver for the steps of a problem."""
     if problem.condensed is None:
-        return LinearSolver(problem.free)
-    return CondensedSolver(problem.condensed, problem.free)
+        return LinearSolver(problem.free, team=problem.team)
+    return CondensedSolver(problem.condensed, problem.free, team=problem.team)
+
+
+def checked_solver(make: Callable[[Problem], LinearSolver], problem: Problem) -> LinearSolver:
+    """What `make` makes for the problem. Raises InputError for what is no solver, or none for ranks where they share it."""
+    solver = make(problem)
+    checks.instance("what solver makes", solver, LinearSolver, "a LinearSolver, as TwoLevelSolver")
+    if solver.team is not problem.team:
+        raise InputError(
+            f"solver: {type(solver).__name__} solves on one rank, and {problem.team.size} share the matrix; leave solver= "
+            "out, or hand `team=problem.team` on to LinearSolver if it knows that each rank has a share"
+        )
+    return solver

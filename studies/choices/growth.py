@@ -46,7 +46,8 @@ from tqdm import tqdm
 from ngswell import TABLE_2, Potential, Ramp, Scene
 from ngswell.closed_forms.homogeneous import homogeneous_equilibrium
 from ngswell.problem.problem import Problem
-from ngswell.solve.direct import CondensedSolver, LinearSolver, best_solver
+from ngswell.solve.direct import CondensedSolver, LinearSolver
+from ngswell.solve.factors import best_solver
 from ngswell.solve.two_level import TwoLevelSolver
 from studies.limits import cylinder
 from studies.output import Findings, letter_panels

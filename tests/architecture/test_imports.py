@@ -5,7 +5,7 @@ from pathlib import Path
 
 PACKAGE = Path(__file__).parents[2] / "ngswell"
 FLOORS = (
-    "version", "units", "errors", "calls", "checks", "files", "streams", "schedules", "histories", "mesh", "physics",
+    "version", "units", "errors", "team", "calls", "checks", "files", "streams", "schedules", "histories", "mesh", "physics",
     "models", "baths", "setup", "problem", "solve", "stepping", "analysis", "observers", "run", "scene",
 )  # fmt: skip
 """From the ground up: each imports only from those before it, and inside a folder no file imports in a circle."""

@@ -40,7 +40,8 @@ from ngswell import (
 from ngswell.files import read_tree, write_tree
 from ngswell.observers.base import Observer
 from ngswell.run.digest import setup_digest
-from ngswell.solve.direct import CondensedSolver, LinearSolver, best_solver
+from ngswell.solve.direct import CondensedSolver, LinearSolver
+from ngswell.solve.factors import best_solver
 from tests.scenes import FALLING, confined_column, strip
 
 

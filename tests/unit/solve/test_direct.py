@@ -23,7 +23,8 @@ from ngswell import (
     rectangle,
 )
 from ngswell.errors import InputError
-from ngswell.solve.direct import CondensedSolver, LinearSolver, _why_not, best_solver, solver_of
+from ngswell.solve.direct import CondensedSolver, LinearSolver, solver_of
+from ngswell.solve.factors import best_solver, why_not
 from tests.scenes import block, confined_column, deformed
 
 
@@ -110,7 +111,7 @@ def test_cudss_is_taken_by_name_or_refused():
     # Untested beyond its name: no machine of ours has a graphics card that NGSolve's cudss runs on.
     problem = block().problem
     refused = (
-        contextlib.nullcontext() if _why_not("cudss") is None else pytest.raises(InputError, match="linear solver 'cudss'")
+        contextlib.nullcontext() if why_not("cudss") is None else pytest.raises(InputError, match="linear solver 'cudss'")
     )
     with refused:
         assert LinearSolver(problem.free, "cudss").name == "cudss"

@@ -1,0 +1,117 @@
+"""The ranks of MPI that compute one scene together: each holds the whole state, and integrates and solves its share."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from functools import cache
+from typing import Any, TypeVar
+
+from ngsolve import BaseVector
+from numpy.typing import NDArray
+
+from ngswell.errors import InputError
+
+Thing = TypeVar("Thing")
+
+LAUNCHERS = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE")
+"""Variables in which launchers tell how many ranks there are: those of Open MPI and of MPICH."""
+
+RANKS = ("OMPI_COMM_WORLD_RANK", "PMI_RANK")
+"""Those that tell which of them this is."""
+
+
+class Team:
+    """Ranks that take the same steps. All methods are called by all of them, in the same order; alone they do nothing."""
+
+    def __init__(self, comm: Any = None) -> None:
+        self.comm = comm
+        self.rank: int = 0 if comm is None else comm.rank
+        self.size: int = 1 if comm is None else comm.size
+
+    @property
+    def alone(self) -> bool:
+        """Whether there is one rank only."""
+        return self.size == 1
+
+    def sum_values(self, values: NDArray) -> None:
+        """Values become their sums over all ranks, in place: the same to the bit on each."""
+        if not self.alone:
+            from mpi4py import MPI
+
+            self.comm.Allreduce(MPI.IN_PLACE, values)
+
+    def sum(self, vector: BaseVector) -> None:
+        """The same of a vector."""
+        self.sum_values(vector.FV().NumPy())
+
+    def all(self, mine: bool) -> bool:
+        """Whether it is so on every rank."""
+        return mine if self.alone else all(self.comm.allgather(bool(mine)))
+
+    def any(self, mine: bool) -> bool:
+        """Whether it is so on some rank."""
+        return mine if self.alone else any(self.comm.allgather(bool(mine)))
+
+    def each(self, mine: Thing) -> list[Thing]:
+        """What each rank has, by rank."""
+        return [mine] if self.alone else self.comm.allgather(mine)
+
+    def of_first(self, make: Callable[[], Thing]) -> Thing:
+        """What the first rank makes, for all; an error that it meets is raised on all."""
+        if self.alone:
+            return make()
+        found: tuple[Any, BaseException | None] = (None, None)
+        if self.rank == 0:
+            try:
+                found = (make(), None)
+            except Exception as error:
+                found = (None, error)
+        made, met = self.comm.bcast(found)
+        if met is not None:
+            raise met
+        return made
+
+    def from_first(self, values: NDArray) -> None:
+        """Values become those of the first rank, in place."""
+        if not self.alone:
+            self.comm.Bcast(values)
+
+    def __repr__(self) -> str:
+        return f"Team of {self.size}"
+
+
+ALONE = Team()
+
+
+def _launched(names: tuple[str, ...]) -> int | None:
+    return next((int(os.environ[name]) for name in names if os.environ.get(name, "").isdigit()), None)
+
+
+def team_of(ranks: bool) -> Team:
+    """All ranks that mpirun has started, if `ranks` are to compute together; else this one alone."""
+    return everyone() if ranks else ALONE
+
+
+@cache
+def everyone() -> Team:
+    """All ranks that mpirun has started; one where it has not.
+
+    Raises InputError where ranks cannot talk to each other: without mpi4py, or with one of another MPI than the launcher's.
+    """
+    size = _launched(LAUNCHERS)
+    if size is None or size == 1:
+        return ALONE
+    try:
+        from mpi4py import MPI
+    except ImportError as error:
+        raise InputError(
+            f"ranks: {size} ranks were started, but mpi4py does not load ({error}); pip install mpi4py, or start one rank"
+        ) from None
+    if MPI.COMM_WORLD.size != size:
+        library = MPI.Get_library_version().partition(",")[0].strip()
+        raise InputError(
+            f"ranks: the launcher started {size} ranks, but mpi4py sees {MPI.COMM_WORLD.size}: it has loaded another MPI "
+            f"({library}) than the launcher's; take the mpirun (or mpiexec) of that MPI"
+        )
+    return Team(MPI.COMM_WORLD)
