@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from functools import cache
+from math import inf
 from typing import Any, TypeVar
 
 from ngsolve import BaseVector
@@ -44,6 +45,11 @@ class Team:
     def sum(self, vector: BaseVector) -> None:
         """The same of a vector."""
         self.sum_values(vector.FV().NumPy())
+
+    def least(self, *mine: float) -> tuple[float, ...]:
+        """The smallest of each number over all ranks; of numbers that are none, −∞."""
+        numbers = tuple(number if number == number else -inf for number in mine)
+        return numbers if self.alone else tuple(map(min, *self.comm.allgather(numbers)))
 
     def all(self, mine: bool) -> bool:
         """Whether it is so on every rank."""

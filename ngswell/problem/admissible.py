@@ -40,6 +40,7 @@ class Admissible:
 
     def __init__(self, discretisation: Discretisation, state: Any, fields: GridFunction) -> None:
         self._discretisation, self._state, self._fields = discretisation, state, fields
+        self._team = discretisation.team
 
     @cached_property
     def always(self) -> dict[str, CoefficientFunction]:
@@ -54,7 +55,7 @@ class Admissible:
 
     def least_content(self) -> float:
         """The smallest J − nS0 at the watched points [-]."""
-        return float(self._values(solution=False)[:, 0].min())
+        return self._team.least(self._values(solution=False)[:, 0].min())[0]
 
     @cached_property
     def of_ions(self) -> dict[str, CoefficientFunction]:
@@ -83,8 +84,13 @@ class Admissible:
         return float(solid) * SQUEEZED / (1 - SQUEEZED)
 
     def _values(self, solution: bool) -> NDArray:
-        points = self._discretisation.points
+        points = self._points
         return self._in_one[solution](points).reshape(points.size, -1)
+
+    @cached_property
+    def _points(self) -> NDArray:
+        """The watched points of this rank."""
+        return self._discretisation.share.of_points(self._discretisation.points)
 
     def violation(self, solution: bool = False) -> Violation | None:
         """What leaves the physical range of iterates (or of a `solution`) at a watched point; None if nothing does."""
@@ -92,13 +98,17 @@ class Admissible:
         if not bounds:
             return None
         values = self._values(solution)
-        if not (values.min() > 0 and values.max() < np.inf):  # not so of NaN
+        least, most, content = self._team.least(values.min(), -values.max(), values[:, 0].min())
+        if not (least > 0 and most > -np.inf):
             for name, column in zip(bounds, values.T, strict=True):
-                worst = int(np.argmin(np.where(np.isfinite(column), column, -np.inf)))
-                if not np.inf > column[worst] > 0:
+                finite = np.where(np.isfinite(column), column, -np.inf)
+                worst = int(np.argmin(finite))
+                found = self._team.each((float(finite[worst]), self._place(self._points[worst : worst + 1])))
+                value, where = min(found, key=lambda one: one[0])
+                if not value > 0:
                     reason = Reason.IONS_RUN_OUT if name in self.of_ions else Reason.NOT_ADMISSIBLE
-                    return Violation(name, self._place(self._discretisation.points[worst : worst + 1]), reason)
-        return None if solution or values[:, 0].min() > self._wet else self.turned()
+                    return Violation(name, where, reason)
+        return None if solution or content > self._wet else self.turned()
 
     def turned(self, fluid: float = SQUEEZED) -> Violation | None:
         """A cell that has turned over at a corner, and is squeezed: at a point of its own, at most this share is fluid.

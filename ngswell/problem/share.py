@@ -37,6 +37,10 @@ class Share:
         factor.vec.FV().NumPy()[:] = self.of_cells == team.rank
         self.factor = CF(factor)
 
+    def of_points(self, points: NDArray) -> NDArray:
+        """Those of the mapped `points` that are in its cells."""
+        return points if self.team.alone else points[self.of_cells[points["nr"]] == self.team.rank]
+
     def describe(self, space: FESpace) -> str:
         """Cells and unknowns of each rank, and how many of them several ranks have."""
         have = np.zeros((self.team.size, space.ndof), dtype=bool)
