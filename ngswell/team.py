@@ -8,6 +8,7 @@ from functools import cache
 from math import inf
 from typing import Any, TypeVar
 
+import numpy as np
 from ngsolve import BaseVector
 from numpy.typing import NDArray
 
@@ -50,6 +51,21 @@ class Team:
         """The smallest of each number over all ranks; of numbers that are none, −∞."""
         numbers = tuple(number if number == number else -inf for number in mine)
         return numbers if self.alone else tuple(map(min, *self.comm.allgather(numbers)))
+
+    def most_values(self, values: NDArray) -> None:
+        """Values become the greatest of all ranks, in place."""
+        if not self.alone:
+            from mpi4py import MPI
+
+            self.comm.Allreduce(MPI.IN_PLACE, values, MPI.MAX)
+
+    def handed_over(self, values: NDArray, to: NDArray, of: NDArray) -> NDArray:
+        """What the others have for this rank, in their order, when `values` are for them: as many as `to` and `of` say."""
+        if self.alone:
+            return values
+        received = np.empty(int(of.sum()), values.dtype)
+        self.comm.Alltoallv((values, to), (received, of))
+        return received
 
     def all(self, mine: bool) -> bool:
         """Whether it is so on every rank."""

@@ -1,4 +1,4 @@
-"""The cells of a body divided among ranks."""
+"""The cells of a body divided among ranks, and its vertices."""
 
 from __future__ import annotations
 
@@ -38,6 +38,19 @@ def _bisect(centres: NDArray, cells: NDArray, first: int, ranks: int, found: NDA
     cut = round(cells.size * half / ranks)
     _bisect(centres, np.sort(cells[order[:cut]]), first, half, found)
     _bisect(centres, np.sort(cells[order[cut:]]), first + half, ranks - half, found)
+
+
+def shares_of_vertices(mesh: Mesh, of_cells: NDArray) -> NDArray:
+    """The rank of each vertex: of those that have a cell there, the one with fewest vertices so far."""
+    around: list[set[int]] = [set() for _ in range(mesh.nv)]
+    for cell in mesh.Elements(VOL):
+        for vertex in cell.vertices:
+            around[vertex.nr].add(int(of_cells[cell.nr]))
+    taken, found = np.zeros(int(of_cells.max()) + 1, dtype=int), np.zeros(mesh.nv, dtype=int)
+    for vertex in sorted(range(mesh.nv), key=lambda vertex: len(around[vertex])):  # first those that one rank has
+        found[vertex] = min(sorted(around[vertex]), key=lambda rank: taken[rank])
+        taken[found[vertex]] += 1
+    return found
 
 
 def shares_of_sides(mesh: Mesh, of_cells: NDArray) -> NDArray:

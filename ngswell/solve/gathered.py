@@ -24,6 +24,7 @@ class Gathered:
         columns, starts = (np.asarray(part) for part in share.CSR()[1:])
         rows = np.repeat(np.arange(share.height), np.diff(starts).astype(np.intp))
         mine = np.array(list(free), dtype=bool)
+        self._unknowns = np.flatnonzero(mine)
         self._entries = np.flatnonzero(mine[rows] & mine[columns])
         numbers = rows[self._entries].astype(np.int64) * share.width + columns[self._entries]
         shares = [numbers] if team.alone else team.comm.gather(numbers)
@@ -61,5 +62,8 @@ class Gathered:
     def solve(self, right: BaseVector, solution: BaseVector) -> bool:
         """See `Factors`."""
         solved = self._team.of_first(lambda: self._factors is not None and self._factors.solve(right, solution))
-        self._team.from_first(solution.FV().NumPy())
+        found = solution.FV().NumPy()[self._unknowns]
+        self._team.from_first(found)
+        solution[:] = 0.0
+        solution.FV().NumPy()[self._unknowns] = found
         return solved

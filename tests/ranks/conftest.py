@@ -28,6 +28,7 @@ def together() -> Together:
 
     def run(ranks: int, *arguments: str, limit: float = LIMIT) -> subprocess.CompletedProcess[str]:
         allowed = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
+        allowed["OMPI_MCA_mpi_yield_when_idle"] = "1"  # else ranks that wait take the cores from those that compute
         command = [mpirun, "--oversubscribe", "-n", str(ranks), sys.executable, *arguments]
         environment = {**os.environ, **allowed, "NGS_NUM_THREADS": "1", "PYTHONPATH": str(ROOT)}
         return subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, timeout=limit, check=False)
