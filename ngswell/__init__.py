@@ -75,6 +75,7 @@ from ngswell.setup.setup import Setup
 from ngswell.setup.snapshot import Snapshot
 from ngswell.setup.supports import Pin, Roller, Support, Symmetry
 from ngswell.solve.newton import DampedNewton
+from ngswell.solve.petsc import PETScSolver
 from ngswell.solve.two_level import TwoLevelSolver
 from ngswell.stepping.schemes import BACKWARD_EULER, ESDIRK4
 from ngswell.stepping.steps import Adaptive, Fixed
@@ -89,9 +90,9 @@ __all__ = [
     "Fixed", "Frozen", "HolmesMow", "HolmesMowSolid", "InnerLayer", "InputError", "InstabilityError",
     "InstabilityWarning", "Integral", "Lagged", "LeastSquares", "Ledger", "Load", "LocalDonnan", "LogNeoHookean", "MPa",
     "MackieMeares", "Material", "MooneyRivlin", "Multiplier", "NeoHookean", "NgswellError", "Nitsche", "Observer",
-    "Obstacle", "Orthotropic", "Outflow", "OutputError", "OverlapWarning", "Penalty", "Pin", "PlaneStrain", "Platen",
-    "Potential", "PowerLaw", "Prescribed", "Pressure", "Probe", "Problem", "Progress", "Ramp", "Reaction", "Reason",
-    "Restart", "Result", "RigidCylinder", "RigidPlane", "RigidSphere", "Role", "Roller", "Scene", "Setup", "Sine",
+    "Obstacle", "Orthotropic", "Outflow", "OutputError", "OverlapWarning", "PETScSolver", "Penalty", "Pin", "PlaneStrain",
+    "Platen", "Potential", "PowerLaw", "Prescribed", "Pressure", "Probe", "Problem", "Progress", "Ramp", "Reaction",
+    "Reason", "Restart", "Result", "RigidCylinder", "RigidPlane", "RigidSphere", "Role", "Roller", "Scene", "Setup", "Sine",
     "Snapshot", "Snapshots", "Spatial", "Spherical", "Spline", "Stability", "StepError", "Support", "Symmetry", "Term",
     "Traction", "TransverselyIsotropic", "TwoLevelSolver", "Uncharged", "UnitsWarning", "Vessel", "Weak", "Weight",
     "box", "by_region", "check_mesh", "column", "day", "from_occ", "hour", "kPa", "metre", "micrometre", "ray",

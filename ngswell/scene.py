@@ -33,7 +33,8 @@ from ngswell.setup.sequence import following
 from ngswell.setup.setup import Setup
 from ngswell.setup.snapshot import Snapshot
 from ngswell.setup.supports import Support
-from ngswell.solve.direct import LinearSolver, solver_of
+from ngswell.solve.choice import solver_of, solver_said
+from ngswell.solve.direct import LinearSolver
 from ngswell.solve.newton import DampedNewton
 from ngswell.stepping.steps import Control
 from ngswell.streams import CSV
@@ -132,6 +133,7 @@ class Scene(Setup):
         lines.append(f"  threads: {threads_said(problem)}")
         if not problem.team.alone:
             lines.append(f"  {problem.share.describe(problem.space)}")
+            lines.append(f"  linear solver: {solver_said(problem)}")
         if self.compiled:
             missing = why_not()
             lines.append("  terms: " + ("compiled to C++" if missing is None else f"bytecode ({missing})"))

@@ -52,8 +52,15 @@ class Team:
         numbers = tuple(number if number == number else -inf for number in mine)
         return numbers if self.alone else tuple(map(min, *self.comm.allgather(numbers)))
 
+    def least_values(self, values: NDArray) -> None:
+        """Values become the least of all ranks, in place."""
+        if not self.alone:
+            from mpi4py import MPI
+
+            self.comm.Allreduce(MPI.IN_PLACE, values, MPI.MIN)
+
     def most_values(self, values: NDArray) -> None:
-        """Values become the greatest of all ranks, in place."""
+        """The same with the greatest."""
         if not self.alone:
             from mpi4py import MPI
 
@@ -66,6 +73,15 @@ class Team:
         received = np.empty(int(of.sum()), values.dtype)
         self.comm.Alltoallv((values, to), (received, of))
         return received
+
+    def joined(self, values: NDArray) -> NDArray:
+        """The values of all ranks, one after the other, on each."""
+        if self.alone:
+            return values
+        sizes = self.each(values.size)
+        together = np.empty(sum(sizes), values.dtype)
+        self.comm.Allgatherv(values, (together, sizes))
+        return together
 
     def all(self, mine: bool) -> bool:
         """Whether it is so on every rank."""

@@ -12,7 +12,7 @@ from ngswell.models.term import Role
 from ngswell.physics import donnan
 from ngswell.problem.problem import Problem
 from ngswell.setup.snapshot import Snapshot
-from ngswell.solve.direct import LinearSolver
+from ngswell.solve.choice import solver_over
 from ngswell.solve.factorisation import Factorisation
 from ngswell.solve.newton import DampedNewton
 
@@ -90,7 +90,7 @@ def outrun(problem: Problem, snapshot: Snapshot, dt: float, failure: Failure) ->
     else:
         problem.restore(snapshot)
         problem.begin_step(time + dt, dt, charge_share=(1 - SLACK) * now / then)
-        outcome = DampedNewton().solve(problem, Factorisation(LinearSolver(problem.free, team=problem.team)))
+        outcome = DampedNewton().solve(problem, Factorisation(solver_over(problem, None)))
         problem.restore(snapshot)
         if outcome.failure is not None:
             return None

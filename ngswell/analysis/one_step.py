@@ -15,7 +15,7 @@ from ngswell.errors import NgswellError
 from ngswell.problem.problem import Problem
 from ngswell.setup.setup import Setup
 from ngswell.setup.snapshot import Snapshot
-from ngswell.solve.direct import LinearSolver
+from ngswell.solve.choice import solver_over
 from ngswell.solve.factorisation import Factorisation
 from ngswell.solve.newton import DampedNewton
 
@@ -76,7 +76,7 @@ def _linearised_step(problem: Problem, time: float, dt: float, scale: NDArray) -
     """δx_old → δx_new about the step of size `dt` from the problem's fields at `time`; `scale` is the size of unknowns."""
     residual, change = problem.fields.vec.CreateVector(), problem.fields.vec.CreateVector()
     old = problem.vector.copy()
-    solver = LinearSolver(problem.free, team=problem.team)
+    solver = solver_over(problem, None)
     problem.begin_step(time + dt, dt)
     failure = DampedNewton().solve(problem, Factorisation(solver)).failure
     if failure is not None:

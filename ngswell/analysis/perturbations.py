@@ -14,7 +14,8 @@ from ngswell.errors import NgswellError, place
 from ngswell.models.term import Kind
 from ngswell.problem.forms import Form
 from ngswell.problem.problem import Problem
-from ngswell.solve.direct import CondensedSolver, LinearSolver
+from ngswell.solve.choice import solver_over
+from ngswell.solve.direct import LinearSolver
 
 SOLVES = 24
 """Krylov vectors in which a negative stiffness has to show."""
@@ -74,11 +75,7 @@ class Perturbations:
         if solver is None:
             whole = problem.reaches_inside
             self._system = problem.form(problem.terms, 1 / problem.dt, condense=not whole)
-            solver = (
-                LinearSolver(problem.free, team=problem.team)
-                if whole
-                else CondensedSolver(self._system, problem.free, team=problem.team)
-            )
+            solver = solver_over(problem, None if whole else self._system)
         self._solver = solver
         trial, test = problem.space.TnT()
         product = InnerProduct(Grad(trial[0]), Grad(test[0])) * problem.kinematics.weight

@@ -21,7 +21,8 @@ from ngswell.run.watch import Watch
 from ngswell.schedules import LARGEST
 from ngswell.setup.setup import Setup
 from ngswell.setup.snapshot import Snapshot
-from ngswell.solve.direct import LinearSolver, checked_solver, solver_of
+from ngswell.solve.choice import solver_of
+from ngswell.solve.direct import LinearSolver, checked_solver
 from ngswell.solve.factorisation import Factorisation
 from ngswell.solve.newton import DampedNewton, Outcome
 

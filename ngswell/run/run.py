@@ -30,7 +30,8 @@ from ngswell.run.threads import threads_for
 from ngswell.run.watch import Watch
 from ngswell.setup.setup import Setup
 from ngswell.setup.snapshot import Snapshot
-from ngswell.solve.direct import LinearSolver, solver_of
+from ngswell.solve.choice import solver_of
+from ngswell.solve.direct import LinearSolver
 from ngswell.solve.newton import DampedNewton
 from ngswell.stepping.stepper import Failed, Stepper
 from ngswell.stepping.steps import Control

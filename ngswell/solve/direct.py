@@ -18,6 +18,9 @@ from ngswell.solve.factors import Factors, best_solver, factors, why_not
 from ngswell.solve.gathered import Gathered
 from ngswell.team import ALONE, Team
 
+MakeFactors = Callable[[BaseMatrix, BitArray, Team], Factors]
+"""Makes factors of a matrix, or of the ranks' shares of it, on its free degrees of freedom."""
+
 
 class LinearSolver:
     """Solves A x = b on the free degrees of freedom, for matrices of one pattern whose values change.
@@ -30,15 +33,16 @@ class LinearSolver:
     4. `direct`, `name`: whether problems are of a size that is factorised as a whole, and what to call it.
 
     `name` is "pardiso", or one of NGSolve's solvers for unsymmetric matrices: "umfpack", or "cudss" on a graphics card where
-    NGSolve has it (never tried by us). Raises InputError for a name that does not work here.
+    NGSolve has it (never tried by us). Raises InputError for a name that does not work here. With `make`, which makes the
+    factors, the name is only what it is called.
     """
 
     direct = True
     """Whether the problem is of a size that is factorised as a whole."""
 
-    def __init__(self, free: BitArray, name: str | None = None, team: Team = ALONE) -> None:
-        self.name, self.team = name or best_solver(), team
-        if refused := why_not(self.name):
+    def __init__(self, free: BitArray, name: str | None = None, team: Team = ALONE, make: MakeFactors | None = None) -> None:
+        self.name, self.team, self._make = name or best_solver(), team, make
+        if make is None and (refused := why_not(self.name)):
             raise InputError(f"linear solver {self.name!r} {refused}; without a name it is {best_solver()!r}")
         self._free = free
         self._matrix: BaseMatrix | None = None
@@ -57,6 +61,8 @@ class LinearSolver:
         return True
 
     def _factors_of(self, matrix: BaseMatrix) -> Factors:
+        if self._make is not None:
+            return self._make(matrix, self._free, self.team)
         if self.team.alone:
             return factors(self.name, matrix, self._free)
         return Gathered(matrix, self._free, self.team, lambda whole: factors(self.name, whole, self._free))
@@ -164,8 +170,15 @@ class CondensedSolver(LinearSolver):
     The factorisation is of their Schur complement: A_bb − A_bi A_ii⁻¹ A_ib.
     """
 
-    def __init__(self, form: Form, free: BitArray, name: str | None = None, team: Team = ALONE) -> None:
-        super().__init__(free & form.linearised.space.FreeDofs(True), name, team)
+    def __init__(
+        self,
+        form: Form,
+        free: BitArray,
+        name: str | None = None,
+        team: Team = ALONE,
+        make: MakeFactors | None = None,
+    ) -> None:
+        super().__init__(free & form.linearised.space.FreeDofs(True), name, team, make)
         self._form, self._condensed = form, form.linearised
         self._work: BaseVector | None = None
 
@@ -185,13 +198,6 @@ class CondensedSolver(LinearSolver):
         self.team.sum(work)
         solution.data += work
         return solved and bool(np.isfinite(solution.FV().NumPy()).all())
-
-
-def solver_of(problem: Problem) -> LinearSolver:
-    """The solver for the steps of a problem."""
-    if problem.condensed is None:
-        return LinearSolver(problem.free, team=problem.team)
-    return CondensedSolver(problem.condensed, problem.free, team=problem.team)
 
 
 def checked_solver(make: Callable[[Problem], LinearSolver], problem: Problem) -> LinearSolver:

@@ -31,7 +31,7 @@ from threadpoolctl import threadpool_limits
 
 from ngswell import Adaptive, Concentration, Potential, Progress, Result, Scene
 from ngswell.models.model import Model
-from ngswell.solve.direct import solver_of
+from ngswell.solve.choice import solver_of
 from studies.output import Findings, cost, letter_panels
 from studies.rivals.turns import milliseconds
 from studies.rivals.worker import ABSENT, add_dolfinx, kernels, machine, usable

@@ -66,7 +66,7 @@ from ngswell import (
     rectangle,
 )
 from ngswell.models.model import Model
-from ngswell.solve.direct import solver_of
+from ngswell.solve.choice import solver_of
 from studies.choices import reference
 from studies.choices.reference import Course, Kept, Reference
 from studies.output import Findings, cost, letter_panels

@@ -23,7 +23,8 @@ from ngswell import (
     rectangle,
 )
 from ngswell.errors import InputError
-from ngswell.solve.direct import CondensedSolver, LinearSolver, solver_of
+from ngswell.solve.choice import solver_of
+from ngswell.solve.direct import CondensedSolver, LinearSolver
 from ngswell.solve.factors import best_solver, why_not
 from tests.scenes import block, confined_column, deformed
 

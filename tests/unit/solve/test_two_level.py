@@ -23,7 +23,8 @@ from ngswell import (
     rectangle,
 )
 from ngswell.closed_forms.homogeneous import homogeneous_equilibrium
-from ngswell.solve.direct import LinearSolver, solver_of
+from ngswell.solve.choice import solver_of
+from ngswell.solve.direct import LinearSolver
 from ngswell.solve.factorisation import Factorisation
 from ngswell.solve.two_level import TOLERANCE, TwoLevelSolver
 
