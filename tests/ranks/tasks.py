@@ -37,6 +37,7 @@ from ngswell import (
     StepError,
     Vessel,
 )
+from ngswell.solve.rows import Rows
 from tests.ranks.scenes import SCENES, cube
 from tests.scenes import FALLING, quarter, strip
 
@@ -103,8 +104,23 @@ def failure() -> dict[str, Any]:
     return {}
 
 
+def rows() -> dict[str, Any]:
+    """A matrix divided by rows, put together again."""
+    problem = cube(2, ranks=True).problem
+    divided = Rows(problem.linearise(), problem.free, problem.team)
+    assert divided.take()
+    mine, size = divided.dofs[divided.own], problem.space.ndof
+    there = np.zeros((size, size))
+    there[np.repeat(mine, np.diff(divided.starts)), divided.dofs[divided.columns]] = divided.values
+    problem.team.sum_values(there)
+    owners = np.zeros(size)
+    owners[mine] += 1
+    problem.team.sum_values(owners)
+    return {"matrix": there, "owners": owners}
+
+
 TASKS: dict[str, Callable[[], dict[str, Any]]] = {
-    task.__name__: task for task in (observers, rest, growth, lagged, kinked, parts, failure)
+    task.__name__: task for task in (observers, rest, growth, lagged, kinked, parts, failure, rows)
 }
 
 
