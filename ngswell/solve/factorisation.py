@@ -12,8 +12,9 @@ from ngswell.files import Tree
 from ngswell.problem.problem import Problem
 from ngswell.solve.direct import LinearSolver
 
-FASTEST = 0.1
-"""An old matrix is not trusted to contract by more: the rate of its first solves does not hold for those of later steps."""
+FASTEST, CAUTION, TRUSTED = 0.1, 3.0, 0.02
+"""The rate of a matrix's first solves does not hold for those of later stages and steps: one above the first is taken as it
+is, a smaller one times the second but as no more than the first, and none as less than the third."""
 
 
 class Point(NamedTuple):
@@ -64,7 +65,7 @@ class Factorisation:
         rate = self._contraction
         if rate is None or not self.slowest:
             return change
-        rate = max(rate, FASTEST)
+        rate = max(rate, min(FASTEST, max(TRUSTED, CAUTION * rate)))
         return change * min(1.0, rate / (1 - rate))
 
     def renew(self, problem: Problem) -> bool:

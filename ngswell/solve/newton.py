@@ -13,7 +13,7 @@ from ngswell.problem.admissible import Violation
 from ngswell.problem.problem import Problem
 from ngswell.solve.factorisation import Factorisation
 from ngswell.solve.search import search
-from ngswell.solve.size import Size
+from ngswell.solve.size import MeanSize, Size
 
 ROUND_OFF = 1e-13
 """Share of a reference size that no correction is asked to be below for the sake of small `shares`."""
@@ -74,7 +74,7 @@ class DampedNewton:
 
     def solve(self, problem: Problem, factorisation: Factorisation, shares: dict[str, float] | None = None) -> Outcome:
         """Iterate from the fields of `problem`, in place. In the test of convergence, by unknown, `shares` of the references
-        take their place."""
+        take their place, and the root mean square that of the largest coefficient: so are a run's errors measured."""
         patient = replace(self, most_iterations=PATIENCE * self.most_iterations) if problem.setup.material.kinked else self
         return _Iteration(patient, problem, factorisation, shares or {}).run()
 
@@ -108,7 +108,8 @@ class _Iteration:
         vectors = (problem.fields.vec.CreateVector() for _ in range(5))
         self.residual, self.correction, self.simplified, self._gap, self._start = vectors
         self.correction[:] = 0.0
-        self._size, self._wanted_size = Size(problem, problem.references), Size(problem, self.wanted)
+        self._size = Size(problem, problem.references)
+        self._wanted_size = (MeanSize if shares else Size)(problem, self.wanted)
         self.count = 0
         self.beyond: Violation | None = None  # what the last correction would leave the physical range with
 

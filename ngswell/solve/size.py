@@ -16,6 +16,20 @@ class Size:
         self._units, self._work = of_coefficients(problem.ranges, units), np.empty(problem.space.ndof)
 
     def __call__(self, vector: BaseVector) -> float:
-        np.abs(vector.FV().NumPy(), out=self._work)
-        self._work /= self._units
-        return float(self._work.max())
+        scaled = np.divide(vector.FV().NumPy(), self._units, out=self._work)
+        return float(max(scaled.max(), -scaled.min()))
+
+
+class MeanSize:
+    """The largest root mean square of an unknown's coefficients, in `units` of each unknown."""
+
+    def __init__(self, problem: Problem, units: dict[str, float]) -> None:
+        parts = sorted((part.start, part.stop) for part in problem.ranges.values() if part.stop > part.start)
+        self._starts, stops = np.array(parts).T
+        self._counts = stops - self._starts
+        self._units, self._work = of_coefficients(problem.ranges, units), np.empty(problem.space.ndof)
+
+    def __call__(self, vector: BaseVector) -> float:
+        scaled = np.divide(vector.FV().NumPy(), self._units, out=self._work)
+        np.square(scaled, out=scaled)
+        return float(np.sqrt((np.add.reduceat(scaled, self._starts) / self._counts).max()))

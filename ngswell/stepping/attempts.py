@@ -96,7 +96,7 @@ class Attempts:
         """About the state at `end` [s], by one step of backward Euler, or none; the fields are left as they were."""
         self.problem.begin_step(end, end - start.time)
         self.factorisation.prepare(self.problem, end - start.time)
-        outcome = ROUGH.solve(self.problem, self.factorisation)
+        outcome = ROUGH.solve(self.problem, self.factorisation, dict.fromkeys(self.problem.names, 1.0))
         values = None if outcome.failure else self.problem.vector.copy()
         self.problem.restore(start)
         return values
