@@ -16,7 +16,7 @@ from ngswell.solve.factorisation import Factorisation
 from ngswell.solve.newton import DampedNewton
 from ngswell.stepping.attempts import Attempt, Attempts
 from ngswell.stepping.schemes import BACKWARD_EULER, Scheme
-from ngswell.stepping.sizes import Sizes
+from ngswell.stepping.sizes import Sizes, safety_of
 from ngswell.stepping.steps import Control, Step
 from ngswell.stepping.timetable import Timetable, landing, resolution, same_time
 
@@ -41,14 +41,11 @@ PATIENCE = 6
 """Attempts at a first step after a kink that may be stuck, before it starts from an instant: errors fall only once the step
 is short for the cells at the bath."""
 
-SAFETY, SAFETY_AFTER_KINK = 1.5, 5.0
-"""What an estimate by the embedded solution is multiplied by. It is low, by about 5, in modes that are stiff at a step, by
-10 to 16 where the slope of before a kink enters the step; most of what is stiff has decayed a step later. With these, random
-scenes reach errors below three times the tolerance (`python -m studies tolerance`)."""
-
-
 AFTER_KINK = 1
 """Power of the step that errors fall with just after a kink, where layers are thinner than cells: measured 0.5 to 1.5."""
+
+LEAST_POWER = 0.5
+"""The least power that a retry reckons with."""
 
 
 class Failed(Exception):
@@ -141,7 +138,7 @@ class Stepper:
         if self.timetable.is_kink(time) or self._wanted is None:
             self._points = []
             self._wanted = self.control.first(kink - time, self._wanted)
-        safety = 1.0 if not self._scheme.embedded else SAFETY if self._points else SAFETY_AFTER_KINK
+        safety = safety_of(self._scheme, not self._points)
         shortest = 0.0 if self._points else 3 * self._instant(kink - time)
         rejected: list[Rejection] = []
         last: Rejection | None = None  # the attempt before, if its error was too large
@@ -155,7 +152,7 @@ class Stepper:
             end = stop if dt == stop - time else time + dt
             points = self._points if lumped == self._lumped else []  # salt that is stored otherwise moves at once
             attempt = self._attempts.take(scheme, self.accepted, points, self._slope, end, lumped)
-            error = safety * self._error(attempt)
+            error = self._error(attempt, safety)
             if attempt.failure is None and self._accepts(error, scheme, last, bool(points)):
                 return self._accept(attempt, error, scheme, dt, tuple(rejected))
             rejection, failure = self._reject(attempt, error, dt)
@@ -202,8 +199,8 @@ class Stepper:
         dt = INSTANT * interval
         return dt if dt >= 10 * resolution(interval, self.accepted.time) else 0.0
 
-    def _error(self, attempt: Attempt) -> float:
-        return inf if attempt.difference is None else attempt.factor * self._sizes.relative(attempt.difference)
+    def _error(self, attempt: Attempt, safety: tuple[float, float] = (1.0, 1.0)) -> float:
+        return inf if attempt.difference is None else attempt.factor * self._sizes.relative(attempt.difference, safety)
 
     def _accepts(self, error: float, scheme: Scheme, last: Rejection | None, smooth: bool) -> bool:
         jumps = not scheme.embedded and not smooth and last is not None and error > JUMP * last.error
@@ -227,7 +224,7 @@ class Stepper:
         error = rejection.error
         usual = AFTER_KINK if scheme.embedded and not self._points else scheme.power
         power = usual if last is None else np.log(last.error / error) / np.log(last.dt / dt)
-        self._wanted = self.control.next(dt, error, np.clip(power, 1, scheme.power))
+        self._wanted = self.control.next(dt, error, np.clip(power, LEAST_POWER, scheme.power))
         return rejection, bool(power < STUCK)
 
     def _accept(self, attempt: Attempt, error: float, scheme: Scheme, dt: float, rejected: tuple[Rejection, ...]) -> Step:

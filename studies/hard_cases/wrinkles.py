@@ -188,7 +188,7 @@ def past_the_limit(quick: bool) -> list[Attempt]:
     for model in ("Potential",) if quick else DEFAULTS:
         run = partial(judged, model=model)
         attempts += [run(SKINNED, 0.0, FOLLOWING), run(SKINNED, 1e-2, HIDING), run(BEYOND, 0.0, HIDING)]
-        attempts.append(run(SKINNED, 1e-4, FOLLOWING))  # within one step to the wrinkled state, which is stable
+        attempts.append(run(SKINNED, 1e-4, FOLLOWING))  # steps find the wrinkled state, which is stable
         if not quick:
             attempts += [run(SKINNED, 0.0, HIDING), run(BEYOND, 0.0, Adaptive(1e-2)), run(BEYOND, 1e-3, HIDING)]
     return attempts

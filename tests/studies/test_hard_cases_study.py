@@ -70,5 +70,5 @@ def check_wrinkles(attempts):
     """No run ends unstable without a word: those that converge step by step to the end warn, those that are watched stop."""
     assert Counter(a["outcome"] for a in attempts) == {"passes": 6, "stops": 1}
     said = [a["message"] for a in attempts if a["message"]]
-    assert len(said) == 5
+    assert len(said) == 4  # not the seed of 1e-4, whose wrinkle the steps find, nor the two that are of the converged one
     assert all("is unstable: perturbations grow" in message and "wrinkles of about" in message for message in said)

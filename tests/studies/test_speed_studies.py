@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from ngswell.stepping import stepper
+from ngswell.stepping import sizes
 from ngswell.stepping.sizes import Sizes
 from studies.__main__ import main
 from studies.choices import speed_error
@@ -143,8 +143,8 @@ def test_without_its_safeguards_a_tolerance_is_missed(monkeypatch):
     assert errors(random_run(17), (1e-4,))[1e-4] < 3
     assert errors(random_run(12), (1e-4,))[1e-4] < 3
     with monkeypatch.context() as without:
-        without.setattr(stepper, "SAFETY", 0.1)
-        without.setattr(stepper, "SAFETY_AFTER_KINK", 0.1)
+        without.setattr(sizes, "SAFETY", 0.1)
+        without.setattr(sizes, "SAFETY_AFTER_KINK", 0.1)
         assert errors(random_run(17), (1e-4,))[1e-4] > 3
     found = Sizes._sizes
     monkeypatch.setattr(Sizes, "_sizes", lambda self, *more: np.maximum(found(self, *more), self._natural()))

@@ -46,6 +46,21 @@ def test_embedded_solution_is_one_order_lower():
     assert ESDIRK4.power == 4  # its error: one order more than the embedded solution's
 
 
+def test_the_estimate_is_low_by_up_to_16_in_stiff_modes():
+    # Of y' = λ(y − t) from 0, z = λ Δt: what SAFETY_AFTER_KINK is made for. Both errors in units of the step.
+    a, _ = tableau(ESDIRK4)
+    embedded, ones = np.array(ESDIRK4.embedded), np.ones(len(a))
+
+    def low(z):
+        stages = np.linalg.solve(np.eye(len(a)) - z * a, ones)
+        estimate = (a[-1] - embedded) @ stages / (1 - z * ESDIRK4.diagonal)
+        return (1 + z * a[-1] @ stages - np.exp(z)) / z / estimate
+
+    ratios = [low(z) for z in -np.logspace(-1, 4, 200)]
+    assert max(ratios) < 16
+    assert low(-10.0) > 14 > 4 > low(-1.0)  # the control: stiff modes only
+
+
 def test_stages_are_of_second_order():
     a, c = tableau(ESDIRK4)
     assert a @ c == pytest.approx(c**2 / 2, abs=1e-15)
