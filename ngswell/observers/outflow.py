@@ -15,8 +15,8 @@ from ngswell.errors import InputError
 from ngswell.mesh.points import vertices_of
 from ngswell.observers.effluxes import Effluxes
 from ngswell.observers.records import Recorder, power_of_mm, product
-from ngswell.problem.forms import BONUS_ORDER
 from ngswell.problem.problem import Problem
+from ngswell.problem.quadrature import BONUS_ORDER
 from ngswell.stepping.steps import Step
 from ngswell.streams import CSV
 

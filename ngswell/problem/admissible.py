@@ -44,7 +44,7 @@ class Admissible:
 
     @cached_property
     def always(self) -> dict[str, CoefficientFunction]:
-        """At the forms' own points, where laws are evaluated."""
+        """At points as near to the sides of cells as those where laws are evaluated."""
         return {CONTENT: self._state.content} | self.of_ions | self._numbers
 
     @cached_property

@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 
 from ngswell import checks
 from ngswell.errors import InputError, place
-from ngswell.mesh.points import rules, vertices, vertices_of
+from ngswell.mesh.points import vertices, vertices_of
 from ngswell.models.model import BathFields, FieldContext
 from ngswell.models.one_number import OneNumber
 from ngswell.problem.lumping import Storage
 from ngswell.problem.per_unknown import of_coefficients
+from ngswell.problem.quadrature import over_body, watched
 from ngswell.problem.share import Share
 from ngswell.problem.tie import Tie
 from ngswell.schedules import Clock, Schedule
@@ -24,10 +25,6 @@ from ngswell.setup.loads import followed
 from ngswell.setup.setup import Setup
 from ngswell.setup.snapshot import Snapshot
 from ngswell.team import team_of
-
-BONUS_ORDER = 2
-"""Extra integration order: the pulled-back terms are rational in F."""
-
 
 ROUND_OFF = 1e-12
 """What a held displacement may be off by, in units of its reference, and count as held."""
@@ -75,12 +72,12 @@ class Discretisation:
     @cached_property
     def rules(self) -> dict[ET, IntegrationRule]:
         """The integration rules of all forms over the body, whatever terms they have."""
-        return rules(2 * self.model.order + BONUS_ORDER)
+        return over_body(self.model.order, self.mesh)
 
     @cached_property
     def points(self) -> NDArray:
-        """Their integration points."""
-        return self.mesh.MapToAllElements(self.rules, VOL)
+        """Where bounds are looked at."""
+        return watched(self.model.order, self.mesh)
 
     @cached_property
     def storage(self) -> Storage:

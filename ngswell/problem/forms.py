@@ -14,8 +14,9 @@ from ngsolve.comp import SumOfIntegrals
 from ngswell.models.term import Kind, Role, Term
 from ngswell.problem.body import Body, NotDerivable, Unknowns
 from ngswell.problem.compiling import Compile, bytecode, cpp
-from ngswell.problem.discretisation import BONUS_ORDER, Discretisation
+from ngswell.problem.discretisation import Discretisation
 from ngswell.problem.lumping import VERTEX_RULES
+from ngswell.problem.quadrature import BONUS_ORDER
 
 
 class Form:

@@ -183,5 +183,6 @@ def test_a_bar_in_space_is_the_bar_of_plane_strain():
         top = Reaction("top")
         scene.equilibrate(1.0, observers=[top], unstable="off")
         forces.append(top.values[-1])
-    assert forces[0] == pytest.approx(forces[1][[0, 2]], rel=1e-7)  # the same fields: what Newton's method leaves
+    # The same fields by rules that differ by a degree: 7e-5 here, 1e-5 with 8 cells, where the mesh still changes 6 %.
+    assert forces[0] == pytest.approx(forces[1][[0, 2]], rel=1e-4)
     assert forces[0][1] > 0.01
