@@ -1,8 +1,8 @@
 """Swelling of charged hydrated porous media on NGSolve. Units mm, N, s, K, mol/l.
 
-Folders, each importing only from those above it: units, errors, team, calls, checks, files, streams, schedules, histories ·
-mesh · physics · models · baths · setup · problem · solve · stepping · analysis · observers · run · scene. Beside them stand
-closed_forms and plotting.
+Folders, each importing only from those above it: units, errors, meeting, team, calls, checks, files, streams, schedules,
+histories · mesh · physics · models · baths · setup · problem · solve · stepping · analysis · observers · run · scene. Beside
+them stand closed_forms and plotting.
 """
 
 from __future__ import annotations

@@ -12,6 +12,7 @@ from threading import RLock
 from typing import Any, TypeVar
 
 from ngswell.errors import InputError
+from ngswell.team import Team, speaks
 
 Thing = TypeVar("Thing")
 
@@ -20,8 +21,13 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 _PACKAGE = __name__.partition(".")[0]
 
 
-def warn(warning: Warning) -> None:
-    """Warn at the line outside the package from which it was called."""
+def warn(warning: Warning, team: Team | None = None) -> None:
+    """Warn at the line outside the package from which it was called; of a `team` the first rank does, for all.
+
+    Without one, that is the first of all that compute together in this process.
+    """
+    if not (speaks() if team is None else team.rank == 0):
+        return
     frame, level = sys._getframe(1), 2
     # By module, not by file: the constructor of a dataclass has none.
     while frame.f_back is not None and frame.f_globals.get("__name__", "").partition(".")[0] == _PACKAGE:

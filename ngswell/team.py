@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import cache
 from math import inf
 from typing import Any, TypeVar
@@ -13,6 +14,7 @@ from ngsolve import BaseVector
 from numpy.typing import NDArray
 
 from ngswell.errors import InputError
+from ngswell.meeting import Meeting, silent_but_first
 
 Thing = TypeVar("Thing")
 
@@ -27,9 +29,22 @@ class Team:
     """Ranks that take the same steps. All methods are called by all of them, in the same order; alone they do nothing."""
 
     def __init__(self, comm: Any = None) -> None:
-        self.comm = comm
+        self._comm = comm
         self.rank: int = 0 if comm is None else comm.rank
         self.size: int = 1 if comm is None else comm.size
+        self._meeting: Meeting | None = None if self.size == 1 else Meeting(comm)
+        if self._meeting is not None:
+            self._meeting.begin()
+
+    def __reduce__(self) -> tuple[Callable[[bool], Team], tuple[bool]]:
+        return team_of, (not self.alone,)
+
+    @property
+    def comm(self) -> Any:
+        """The communicator, taken for a collective call."""
+        if self._meeting is not None:
+            self._meeting.entered += 1
+        return self._comm
 
     @property
     def alone(self) -> bool:
@@ -110,6 +125,30 @@ class Team:
             raise met
         return made
 
+    def of_each(self, make: Callable[[], Thing]) -> Thing:
+        """What this rank makes by itself; an error that one meets is raised on all."""
+        if self.alone:
+            return make()
+        made, met = None, None
+        try:
+            made = make()
+        except Exception as error:
+            met = error
+        for one in self.each(met):
+            if one is not None:
+                raise one
+        return made  # type: ignore[return-value]
+
+    @contextmanager
+    def settled(self) -> Iterator[None]:
+        """An error leaves this only if all ranks have met one of its kind; else it ends all, with a message."""
+        try:
+            yield
+        except BaseException as error:
+            if self._meeting is not None:
+                self._meeting.settle(error)
+            raise
+
     def from_first(self, values: NDArray) -> None:
         """Values become those of the first rank, in place."""
         if not self.alone:
@@ -124,6 +163,11 @@ ALONE = Team()
 
 def _launched(names: tuple[str, ...]) -> int | None:
     return next((int(os.environ[name]) for name in names if os.environ.get(name, "").isdigit()), None)
+
+
+def speaks() -> bool:
+    """Whether what this process has to say is said by it: by the first of the ranks that compute together."""
+    return not everyone.cache_info().currsize or everyone().rank == 0
 
 
 def team_of(ranks: bool) -> Team:
@@ -143,13 +187,20 @@ def everyone() -> Team:
     try:
         from mpi4py import MPI
     except ImportError as error:
-        raise InputError(
+        raise _said_once(
             f"ranks: {size} ranks were started, but mpi4py does not load ({error}); pip install mpi4py, or start one rank"
         ) from None
     if MPI.COMM_WORLD.size != size:
         library = MPI.Get_library_version().partition(",")[0].strip()
-        raise InputError(
+        raise _said_once(
             f"ranks: the launcher started {size} ranks, but mpi4py sees {MPI.COMM_WORLD.size}: it has loaded another MPI "
             f"({library}) than the launcher's; take the mpirun (or mpiexec) of that MPI"
         )
     return Team(MPI.COMM_WORLD)
+
+
+def _said_once(text: str) -> InputError:
+    """An error of all ranks, which cannot talk to each other, for the first to tell."""
+    error = InputError(text)
+    silent_but_first(error, _launched(RANKS) or 0)
+    return error

@@ -90,12 +90,12 @@ def warn_of_overlap(discretisation: Discretisation, snapshot: Snapshot) -> bool:
             f"at t = {snapshot.time:.10g} s {found}. Contact is not modelled: from where parts meet on, states are not "
             "physical. Remedies: end the run before; a bath or supports with which they do not meet."
         )
-        warn(OverlapWarning(text))
+        warn(OverlapWarning(text), discretisation.team)
     loads = discretisation.setup.loads
     state = discretisation.state_at(snapshot) if loads else None
     amiss = list(filter(None, (load.amiss(state, snapshot.time) for load in loads)))
     for what in amiss:
-        warn(OverlapWarning(f"at t = {snapshot.time:.10g} s {what}"))
+        warn(OverlapWarning(f"at t = {snapshot.time:.10g} s {what}"), discretisation.team)
     return found is not None or bool(amiss)
 
 

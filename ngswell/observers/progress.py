@@ -30,7 +30,7 @@ class Progress(Observer):
         self._bar = tqdm(
             total=until - begin,
             desc=self.label,
-            disable=not sys.stderr.isatty(),
+            disable=problem.team.rank > 0 or not sys.stderr.isatty(),
             leave=False,
             bar_format="{desc} {percentage:3.0f}%|{bar}| {n:.0f}/{total:.0f} s simulated [{elapsed}<{remaining}{postfix}]",
         )
@@ -53,6 +53,8 @@ class Progress(Observer):
 
     def finish(self, problem: Problem) -> None:
         self._bar.close()
+        if problem.team.rank > 0:
+            return
         tally = self._tally
         print(
             f"{self.label}: t = {self._begin:g} s to {readable(self._reached)}, "

@@ -94,4 +94,4 @@ class Stability(Observer):
         if self._rates and self._rates[-1] > 0 and not self._stopped and self.last:
             at = f"t = {self._recorded[-1]:.10g} s"
             text = f"Stability: the last state looked at, {at}, is unstable: {self.last}. {REMEDIES[Reason.UNSTABLE]}"
-            warn(InstabilityWarning(text))
+            warn(InstabilityWarning(text), problem.team)

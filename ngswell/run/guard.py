@@ -83,7 +83,7 @@ class Guard:
                 found = self._perturbations.fastest(self._slowest)
             except NgswellError as error:
                 text = f"whether the state at t = {time:.10g} s is stable could not be told: {error}"
-                warn(InstabilityWarning(text))
+                warn(InstabilityWarning(text), self._problem.team)
         self._solver.factorisations, self._solver.solves = counts
         if found is not None:
             self._tell(time, 0.0, found)
@@ -102,4 +102,4 @@ class Guard:
         error.end = self._problem.snapshot(time)
         if answer == "error":
             raise error
-        warn(InstabilityWarning(f"{error.said} {error.failure.remedy}"))
+        warn(InstabilityWarning(f"{error.said} {error.failure.remedy}"), self._problem.team)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from contextlib import closing, nullcontext
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import closing, contextmanager, nullcontext
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -36,6 +36,7 @@ from ngswell.solve.newton import DampedNewton
 from ngswell.stepping.stepper import Failed, Stepper
 from ngswell.stepping.steps import Control
 from ngswell.streams import CSV
+from ngswell.team import team_of
 
 
 @in_turn
@@ -58,7 +59,7 @@ def run(
     if checkpoint is not None:
         checks.instance("checkpoint", checkpoint, Checkpoint, "a Checkpoint(path)")
     steps_taken = StepLog(log)
-    with nullcontext() if checkpoint is None else checkpoint.alone(), closing(steps_taken):
+    with nullcontext() if checkpoint is None else checkpoint.alone(), closing(steps_taken), team_of(setup.ranks).settled():
         return _run(setup, until, method, watch, resume, checkpoint, steps_taken)
 
 
@@ -75,7 +76,7 @@ def _run(
     method.check_first_step(start.begin, start.until)
     timetable, problem = start.timetable(setup, watch, checkpoint), Problem(setup)
     start.apply(problem)
-    with threads_for(problem), threadpool_limits(1, user_api="blas"), Signals(checkpoint is not None) as signals, watch:
+    with _settings(problem), Signals(checkpoint is not None, problem.team) as signals, watch:
         watch.start(problem, start.begin, start.time, start.until, start.remembered)
         steps.begin(*start.logged)
         stepper = method.stepper(problem, timetable, start.restart)
@@ -85,13 +86,14 @@ def _run(
         if checkpoint:
             checkpoint.save(log.restart)
         try:
-            for step in signals.until_received(stepper):
-                steps.append(step.report())
-                watch.observe(step)
-                guard.after_step(step.time, timetable.is_kink(step.time) and step.time < timetable.end)
-                overlaps.after_step(stepper.accepted, stepper.factorisation.solver.solves)
-                if checkpoint:
-                    checkpoint.after(step.time, log.restart)
+            with problem.team.settled():
+                for step in signals.until_received(stepper):
+                    steps.append(step.report())
+                    watch.observe(step)
+                    guard.after_step(step.time, timetable.is_kink(step.time) and step.time < timetable.end)
+                    overlaps.after_step(stepper.accepted, stepper.factorisation.solver.solves)
+                    if checkpoint:
+                        checkpoint.after(step.time, log.restart)
         except BaseException as error:
             problem.restore(stepper.accepted)
             if checkpoint and (signals.stepping or isinstance(error, InstabilityError)):  # observers agree on the last step
@@ -106,11 +108,18 @@ def _run(
         else:
             if checkpoint:
                 checkpoint.save(log.restart)
-            if signals.received is None:
+            if not signals.came():
                 guard.at_end(stepper.accepted.time)
     overlaps.look(stepper.accepted)
     signals.end(stepper.accepted.time, checkpoint.path if checkpoint else None)
     return log.result(setup)
+
+
+@contextmanager
+def _settings(problem: Problem) -> Iterator[None]:
+    """The threads that suit a problem; BLAS, which NGSolve calls from them, takes one."""
+    with threads_for(problem), threadpool_limits(1, user_api="blas"):
+        yield
 
 
 def _step_error(failed: Failed, problem: Problem, stepper: Stepper, start: Start) -> StepError:

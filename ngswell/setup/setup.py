@@ -92,7 +92,7 @@ class Setup:
             load.check_in(self)
         self.initial_bath()  # refuses baths that differ at the start
         if self.origin is None:
-            check_units(self.mesh, self.material)
+            check_units(self.mesh, self.material, team_of(self.ranks))
         checks.set_fields(self, _made_with=self._values())
 
     # -- checks --------------------------------------------------------------------------------------------------------

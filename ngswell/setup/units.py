@@ -11,6 +11,7 @@ from ngswell.calls import warn
 from ngswell.errors import UnitsWarning
 from ngswell.mesh.points import vertices
 from ngswell.physics.material import Material
+from ngswell.team import Team
 
 SHORTEST = 1e-2
 """Time [s] within which no body is at rest again: a gel bead 10 µm across, with half that to the bath, takes some 0.05 s."""
@@ -22,14 +23,14 @@ RATIOS = 1e-6, 1e4
 """(2µ + λ) K/D: gels, cartilage and clays lie between 1e-3 and 1e3, as narrow pores hinder fluid and salt alike."""
 
 
-def check_units(mesh: Mesh, material: Material) -> None:
-    """Warn with UnitsWarning of a body whose numbers hardly belong together.
+def check_units(mesh: Mesh, material: Material, team: Team) -> None:
+    """Warn, once for the team, with UnitsWarning of a body whose numbers hardly belong together.
 
     What is compared: the times L²/[K (2µ + λ)] and L²/D in which fluid and salt pass the largest extent L; the one over the
     other; the pressure Rθ cfc0 over 2µ + λ. Without ions only the first is left.
     """
     if doubts := list(_doubts(mesh, material)):
-        warn(UnitsWarning(" Besides, ".join(doubts)))
+        warn(UnitsWarning(" Besides, ".join(doubts)), team)
 
 
 def _doubts(mesh: Mesh, material: Material) -> Iterator[str]:

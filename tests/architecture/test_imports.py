@@ -5,8 +5,8 @@ from pathlib import Path
 
 PACKAGE = Path(__file__).parents[2] / "ngswell"
 FLOORS = (
-    "version", "units", "errors", "team", "calls", "checks", "files", "streams", "schedules", "histories", "mesh", "physics",
-    "models", "baths", "setup", "problem", "solve", "stepping", "analysis", "observers", "run", "scene",
+    "version", "units", "errors", "meeting", "team", "calls", "checks", "files", "streams", "schedules", "histories", "mesh",
+    "physics", "models", "baths", "setup", "problem", "solve", "stepping", "analysis", "observers", "run", "scene",
 )  # fmt: skip
 """From the ground up: each imports only from those before it, and inside a folder no file imports in a circle."""
 
