@@ -28,7 +28,8 @@ class PrescribedValues:
     def __init__(self, discretisation: Discretisation, fields: GridFunction, baths: dict[str, BathFields]) -> None:
         self._discretisation, self._fields, self._baths = discretisation, fields, baths
         self._treated = discretisation.setup.prescribed_baths
-        self._pairs: list[tuple[NDArray, NDArray]] = []
+        self._held = np.zeros(0, dtype=int)
+        self._wanted = np.zeros(discretisation.space.ndof)
         self._set: dict[tuple[str, str], Bounded] = {}
         charge = discretisation.model.charge_field
         self._charges: dict[Charge, GridFunction] = {}
@@ -43,7 +44,7 @@ class PrescribedValues:
 
     def update(self, time: float) -> None:
         """Take the values that hold at `time` [s], that of the baths."""
-        self._pairs = [(dofs, np.full(dofs.size, history.at(time))) for dofs, history in self._discretisation.displaced]
+        pairs = [(dofs, np.full(dofs.size, history.at(time))) for dofs, history in self._discretisation.displaced]
         for bath, treatment in self._treated:
             on = PrescribedBoundary(
                 self._boundaries[bath.boundary], self._charges.get(treatment.charge_of), self._equilibrium(bath.boundary)
@@ -53,7 +54,11 @@ class PrescribedValues:
                 field.set(value)
                 dofs = self._dofs[name, bath.boundary]
                 start = self._discretisation.ranges[name].start
-                self._pairs.append((start + dofs, field.field.vec.FV().NumPy()[dofs]))
+                pairs.append((start + dofs, field.field.vec.FV().NumPy()[dofs]))
+        for dofs, values in reversed(pairs):
+            self._wanted[dofs] = values
+        if pairs and not self._held.size:
+            self._held = np.unique(np.concatenate([dofs for dofs, _ in pairs]))
 
     def _on_boundary(self, bath: Bath, name: str) -> Bounded:
         """A field with the values of an unknown on the boundary of a bath."""
@@ -67,8 +72,7 @@ class PrescribedValues:
     def gap(self, vector: NDArray) -> NDArray:
         """What `vector` exceeds the prescribed values by, where there are any; zero elsewhere."""
         gap = np.zeros(vector.size)
-        for dofs, values in reversed(self._pairs):
-            gap[dofs] = vector[dofs] - values
+        gap[self._held] = vector[self._held] - self._wanted[self._held]
         return gap
 
     def _equilibrium(self, boundary: str) -> Any:
