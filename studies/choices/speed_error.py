@@ -233,8 +233,8 @@ def our_curves(quick: bool) -> list[Curve]:
         return through(name.lower().replace(" ", "_"), name, runs)
 
     second = [(4, 1e-1), (6, 3e-2)] if quick else [(6, 3e-2), (8, 1e-2), (12, 3e-3), (16, 1e-3), (24, 3e-4)]
-    third = [(3, 1e-1), (5, 3e-2)] if quick else [(3, 1e-1), (4, 1e-2), (6, 1e-3), (8, 3e-4), (8, 1e-4), (12, 3e-5)]
-    fourth = [(2, 1e-1), (4, 3e-2)] if quick else [(3, 1e-2), (4, 1e-3), (6, 3e-4), (6, 1e-4), (8, 3e-5)]
+    third = [(3, 1e-1), (5, 3e-2)] if quick else [(3, 1e-1), (4, 1e-2), (6, 1e-3), (8, 1e-3), (8, 3e-4), (12, 3e-5)]
+    fourth = [(2, 1e-1), (4, 3e-2)] if quick else [(3, 1e-2), (4, 1e-3), (5, 1e-3), (6, 1e-3), (6, 3e-4), (8, 3e-5)]
     uniform = [(4, 1e-1), (6, 3e-2)] if quick else [(6, 3e-2), (11, 1e-2), (22, 1e-3)]
     in_cpp = [] if quick else [curve("Potential order 3 graded compiled", Potential(3), 6.0, third, compiled=True)]
     return [
@@ -274,7 +274,7 @@ def rival_curves(quick: bool, dolfinx: str | None) -> Iterator[list[Curve]]:
         ("euler", "uniform"): [(11, 1e-2), (22, 1e-3), (22, 3e-4)],
         ("esdirk4", "uniform"): [(11, 1e-2), (22, 1e-3), (44, 1e-3)],
         ("euler", "graded"): [(4, 3e-3), (6, 3e-4), (8, 3e-5)],
-        ("esdirk4", "graded"): [(3, 1e-2), (4, 1e-2), (4, 1e-3), (6, 1e-3), (6, 1e-4), (8, 1e-4), (12, 1e-5)],
+        ("esdirk4", "graded"): [(3, 1e-2), (4, 1e-2), (4, 1e-3), (6, 1e-3), (6, 1e-4), (8, 3e-4), (12, 1e-5)],
     }
     if quick:
         cases = {("euler", "uniform"): [(6, 1e-2)], ("esdirk4", "graded"): [(3, 1e-2), (4, 1e-2)]}
