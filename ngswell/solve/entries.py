@@ -54,7 +54,7 @@ class Entries:
         if self._team.alone:
             return own
         received = self._team.handed_over(own[self._sent], self._to, self._of)
-        sums = np.bincount(self._places, received, self._patterns[1][0].size)
+        sums = np.bincount(self._places, received, self._patterns[1][0].size).astype(float)  # integers of nothing received
         sums[self._mine] += own[self._at]
         return np.concatenate([own, sums])
 

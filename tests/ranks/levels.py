@@ -13,11 +13,11 @@ from typing import Any
 
 import numpy as np
 
-from ngswell import Adaptive, Bath, Fixed, InstabilityWarning, Scene, TwoLevelSolver, Vessel
+from ngswell import Adaptive, Bath, Fixed, InstabilityWarning, Potential, Scene, TwoLevelSolver, Vessel
 from ngswell.problem.problem import Problem
 from ngswell.team import everyone
 from tests.ranks.scenes import cube, cylinder
-from tests.scenes import quarter
+from tests.scenes import FALLING, quarter, strip
 
 RUNS: dict[str, tuple[partial[Scene], Any, float]] = {
     "cube": (partial(cube, 3), Adaptive(1e-2), 5.0),
@@ -31,17 +31,17 @@ RUNS: dict[str, tuple[partial[Scene], Any, float]] = {
 """Whole runs: with an unknown that all cells have, and with unknowns of several ranks that are one number."""
 
 
-def prepared(dt: float) -> tuple[Problem, Any]:
-    """A first step of the cube, and its matrix."""
-    problem = cube(4, ranks=True).problem
+def prepared(scene: Scene, dt: float) -> tuple[Problem, Any]:
+    """A first step, and its matrix."""
+    problem = scene.problem
     problem.initialise()
     problem.begin_step(dt, dt)
     return problem, problem.linearise()
 
 
-def solved(dt: float) -> dict[str, Any]:
+def solved(scene: Scene, dt: float) -> dict[str, Any]:
     """The first correction of a step, and how the work is divided."""
-    problem, matrix = prepared(dt)
+    problem, matrix = prepared(scene, dt)
     solver = TwoLevelSolver(problem)
     right, solution, gap = (problem.fields.vec.CreateVector() for _ in range(3))
     problem.residual(right)
@@ -56,12 +56,13 @@ def solved(dt: float) -> dict[str, Any]:
         "entries": problem.team.each(matrix.nze),
         "inverses": problem.team.each(sum(one.size for one in parts.patches._inverses)),
         "exchanged": problem.team.each(parts.shared.exchanged),
+        "received": problem.team.each(0 if problem.team.alone else int(parts.patches._entries._of.sum())),
     }
 
 
 def broken(value: float) -> dict[str, Any]:
     """What ranks say of a matrix whose entries of one unknown, inside a cell of the last rank, are `value`."""
-    problem, matrix = prepared(10.0)
+    problem, matrix = prepared(cube(4, ranks=True), 10.0)
     inside = problem.space.components[0].components[0]
     dof = inside.GetDofNrs(list(problem.mesh.Elements())[-1])[-1]
     columns, starts = (np.asarray(part) for part in matrix.CSR()[1:])
@@ -94,7 +95,8 @@ def ran(name: str) -> dict[str, Any]:
 def outcome() -> dict[Any, dict[str, Any]]:
     """All of these."""
     return {
-        **{dt: solved(dt) for dt in (10.0, 0.1)},
+        **{dt: solved(cube(4, ranks=True), dt) for dt in (10.0, 0.1)},
+        "strip": solved(strip(None, FALLING, (1, 7), model=Potential(), ranks=True), 5.0),
         "singular": broken(0.0),
         "not finite": broken(float("nan")),
         **{name: ran(name) for name in RUNS},
