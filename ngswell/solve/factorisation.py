@@ -80,8 +80,13 @@ class Factorisation:
         return True
 
     def solve(self, right: BaseVector, solution: BaseVector, prescribed: BaseVector | None = None) -> bool:
-        """solution = A⁻¹ right, with `prescribed` values where degrees of freedom are not free; False if not finite."""
-        return self.solver.solve(right, solution, prescribed)
+        """solution = A⁻¹ right, with `prescribed` values where degrees of freedom are not free; False if none is found.
+
+        A factorisation that finds none is not used again.
+        """
+        solved = self.solver.solve(right, solution, prescribed)
+        self._ready &= solved
+        return solved
 
     def state(self) -> Tree:
         """What makes the next solve, or the next factorisation, the same in another process."""

@@ -16,16 +16,24 @@ from ngswell.team import Team
 class Gathered:
     """Factors of the sum of all ranks' shares, on the first rank; the others wait for what it finds.
 
-    Memory and time of the factorisation are those of one rank; residuals and matrices are still made by all.
+    Memory and time of the factorisation are those of one rank; residuals and matrices are still made by all. `needed` tells
+    by row and column which entries the factors are made of, if not of those between free degrees of freedom.
     """
 
-    def __init__(self, share: BaseMatrix, free: BitArray, team: Team, make: Callable[[BaseMatrix], Factors]) -> None:
+    def __init__(
+        self,
+        share: BaseMatrix,
+        free: BitArray,
+        team: Team,
+        make: Callable[[BaseMatrix], Factors],
+        needed: Callable[[NDArray, NDArray], NDArray] | None = None,
+    ) -> None:
         self._share, self._team = share, team
         columns, starts = (np.asarray(part) for part in share.CSR()[1:])
         rows = np.repeat(np.arange(share.height), np.diff(starts).astype(np.intp))
         mine = np.array(list(free), dtype=bool)
         self._unknowns = np.flatnonzero(mine)
-        self._entries = np.flatnonzero(mine[rows] & mine[columns])
+        self._entries = np.flatnonzero(mine[rows] & mine[columns] if needed is None else needed(rows, columns))
         numbers = rows[self._entries].astype(np.int64) * share.width + columns[self._entries]
         shares = [numbers] if team.alone else team.comm.gather(numbers)
         self._sizes = team.each(self._entries.size)

@@ -123,8 +123,13 @@ class _Iteration:
         fresh = not self.factorisation.usable
         while self.count < self.method.most_iterations:
             self.count += 1
-            if (fresh and not self.factorisation.renew(self.problem)) or not (known or self._solve(self.correction)):
+            if fresh and not self.factorisation.renew(self.problem):
                 return self._failed(Reason.SINGULAR)
+            if not (known or self._solve(self.correction)):
+                if fresh:
+                    return self._failed(Reason.SINGULAR)
+                fresh = True  # the old matrix finds none
+                continue
             ended, accepted, damping = self._damp(fresh)
             if ended is not None:
                 return ended

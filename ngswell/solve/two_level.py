@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from ngsolve import ELEMENT, VOL, BaseMatrix, BaseVector, BitArray, NodeId
-from ngsolve.la import SparseMatrixd
+from ngsolve import ELEMENT, VOL, BaseMatrix, BaseVector, NodeId
 from numpy.typing import NDArray
 
 from ngswell.errors import InputError
 from ngswell.mesh.shares import shares_of_vertices
 from ngswell.problem.problem import Problem
+from ngswell.solve.coarse import CoarseLevel, Part
 from ngswell.solve.direct import LinearSolver
 from ngswell.solve.krylov import Krylov
 from ngswell.solve.patches import Patches
@@ -23,20 +23,18 @@ that is solved for, and Newton's method looks at what they leave: a kept matrix 
 ROUND_OFF = 1e-13
 """It also stops below this residual, in units of the fields. At a state of rest the right-hand side is round-off only."""
 
-MOST_ITERATIONS = 150
-"""Iterations of a solve. A step of 1e-4 of the time that fluid takes to cross a cell needs some forty."""
+MOST_ITERATIONS = 60
+"""Iterations of a solve. Steps of all sizes need some ten; sixty leave a matrix that is all but singular."""
 
 
 class TwoLevelSolver(LinearSolver):
     """Solves A x = b on the free degrees of freedom of a problem iteratively: `scene.run(..., solver=TwoLevelSolver)`.
 
-    The preconditioner B is an exact solve on the coarse level, which is spanned by the functions of first order, and then
-    exact solves on the cells around each vertex, added up. The bases are hierarchical: all these are submatrices of A.
-    B A x = B b is solved to `tolerance`, every coefficient counted in the unit of its field (`Problem.references`), in the
-    space of what earlier solves with A have tried (`Krylov`).
-
-    In steps far shorter than fluid takes to cross a cell, displacements have to preserve volume, which those of first
-    order cannot together with pressures of first order: iterations rise to three or four times their number.
+    The preconditioner B is an exact solve on the functions of first order (`CoarseLevel`), and then exact solves on the
+    cells around each vertex, added up (`Patches`). The bases are hierarchical: these are submatrices of A, up to what stands
+    for finer displacements. B A x = B b is solved to `tolerance`, every coefficient counted in the unit of its field
+    (`Problem.references`), in the space of what earlier solves with A have tried (`Krylov`). Iterations hardly depend on the
+    size of cells and steps.
 
     Of several ranks each has its share of A, of the cells around vertices and of the vectors of Krylov's method; the coarse
     level is solved on the first.
@@ -52,8 +50,7 @@ class TwoLevelSolver(LinearSolver):
             raise InputError("TwoLevelSolver is for bodies in the plane and in space; leave solver= out for a column")
         super().__init__(problem.free, team=problem.team)
         self._units = problem.sizes
-        self._level = _coarse_level(problem)
-        self._coarse = LinearSolver(self._level, team=self.team)
+        self._coarse = CoarseLevel(problem)
         self._dofs_of_patches = _patches(problem)
         self._parts: _Parts | None = None  # known from the first matrix on
         self._values, self._left, self._correction = (problem.fields.vec.CreateVector() for _ in range(3))
@@ -69,7 +66,7 @@ class TwoLevelSolver(LinearSolver):
         if not self._coarse.factorise(matrix):
             return False
         if self._parts is None:
-            self._parts = _Parts(self._dofs_of_patches, matrix, self._level, self.team)
+            self._parts = _Parts(self._dofs_of_patches, matrix, self._coarse.dofs, self.team)
         self._parts.krylov.forget()
         if not self._parts.patches.prepare(matrix):
             return False
@@ -107,7 +104,8 @@ class TwoLevelSolver(LinearSolver):
         assert self._parts is not None
         parts, own = self._parts, self._parts.shared.own
         self._coarse.invert(self._on_level(), self._correction)
-        self._left.data -= parts.columns.matrix * self._correction
+        parts.level.FV().NumPy()[:] = self._correction.FV().NumPy()[self._coarse.dofs]
+        self._left.data -= parts.columns.matrix * parts.level
         parts.shared.sum(self._left.FV().NumPy())
         found = parts.patches(self._left.FV().NumPy())
         parts.shared.sum(found)
@@ -117,7 +115,7 @@ class TwoLevelSolver(LinearSolver):
         """What the shares in `_left` are together on the coarse level; other unknowns are of no account."""
         if self.team.alone:
             return self._left
-        level = np.flatnonzero(self._level)
+        level = self._coarse.dofs
         values = self._left.FV().NumPy()[level]
         self.team.sum_values(values)
         self._values.FV().NumPy()[level] = values
@@ -127,26 +125,11 @@ class TwoLevelSolver(LinearSolver):
 class _Parts:
     """What is made for the pattern of the first matrix."""
 
-    def __init__(self, dofs: list[list[int]], matrix: BaseMatrix, level: BitArray, team: Team) -> None:
-        self.patches, self.columns = Patches(dofs, matrix, team), _Columns(matrix, level)
+    def __init__(self, dofs: list[list[int]], matrix: BaseMatrix, level: NDArray, team: Team) -> None:
+        self.patches, self.columns = Patches(dofs, matrix, team), Part(matrix, np.arange(matrix.height), level)
+        self.level = self.columns.matrix.CreateRowVector()
         self.shared = Shared(matrix, self.patches.unknowns, team)
         self.krylov = Krylov(self.shared.count, MOST_ITERATIONS, team)
-
-
-class _Columns:
-    """The columns of a matrix that belong to chosen degrees of freedom, as a matrix."""
-
-    def __init__(self, matrix: BaseMatrix, chosen: BitArray) -> None:
-        _, columns, starts = (np.asarray(part) for part in matrix.CSR())
-        mine, size = np.array(list(chosen), dtype=bool)[columns], matrix.height
-        before = np.concatenate([[0], np.cumsum(mine)])[starts.astype(np.intp)]  # in the rows above
-        rows = np.repeat(np.arange(size, dtype=np.int32), np.diff(before))
-        self._entries: NDArray = np.flatnonzero(mine).astype(np.int32 if mine.size < 2**31 else np.int64)
-        self.matrix = SparseMatrixd.CreateFromCOO(rows, columns[mine].astype(np.int32), np.zeros(rows.size), size, size)
-
-    def update(self, matrix: BaseMatrix) -> None:
-        """Take the values of another matrix of the same pattern."""
-        np.take(np.asarray(matrix.CSR()[0]), self._entries, out=self.matrix.AsVector().FV().NumPy(), mode="clip")
 
 
 def _patches(problem: Problem) -> list[list[int]]:
@@ -165,16 +148,3 @@ def _patches(problem: Problem) -> list[list[int]]:
                 patches[vertex.nr] += space.GetDofNrs(NodeId(ELEMENT, cell.nr))
     free = [[dof for dof in patch if dof >= 0 and problem.free[dof]] for patch in patches.values()]
     return [patch for patch in free if patch]
-
-
-def _coarse_level(problem: Problem) -> BitArray:
-    """Free degrees of freedom of first order, and numbers."""
-    chosen = BitArray(problem.space.ndof)
-    chosen.Clear()
-    for name in problem.numbers:
-        chosen.Set(problem.ranges[name].start)
-    for vertex in problem.mesh.vertices:
-        for dof in problem.space.GetDofNrs(vertex):
-            if dof >= 0:
-                chosen.Set(dof)
-    return chosen & problem.free

@@ -23,13 +23,14 @@ def there(request, together, tmp_path_factory):
     return pickle.loads(out.read_bytes())
 
 
-@pytest.mark.parametrize("which", [10.0, 0.1, "strip"])
-def test_a_solve_is_that_of_one_rank(which, here, there):
+@pytest.mark.parametrize(("which", "share"), [(10.0, 5e-5), (0.1, 5e-4), ("strip", 5e-5)])
+def test_a_solve_is_that_of_one_rank(which, share, here, there):
     assert set(there[which]["iterations"]) == set(here[which]["iterations"])
     # Sums are in another order, by 1e-16 of their terms, so here and there an entry is rounded to single precision, 6e-8,
-    # the other way: measured up to 4e-7 of the largest. Patches scaled by the rank's own largest entry left 5e-5.
-    found, wanted = there[which]["values"], here[which]["values"]
-    np.testing.assert_allclose(found, wanted, rtol=0, atol=5e-6 * np.abs(wanted).max())
+    # the other way, which Krylov's method amplifies. Noise of 1e-10 to 6e-8 put into the patches of one rank by hand changes
+    # what it finds by up to 1.5e-5 of the largest for 10 s, and 1.4e-4 for 0.1 s; solves stop at 1e-3.
+    atol = share * np.abs(here[which]["values"]).max()
+    np.testing.assert_allclose(there[which]["values"], here[which]["values"], rtol=0, atol=atol)
 
 
 def test_a_rank_may_have_patches_that_no_other_adds_to(there):

@@ -23,6 +23,7 @@ from ngswell import (
     rectangle,
 )
 from ngswell.closed_forms.homogeneous import homogeneous_equilibrium
+from ngswell.errors import Reason
 from ngswell.solve.choice import solver_of
 from ngswell.solve.direct import LinearSolver
 from ngswell.solve.factorisation import Factorisation
@@ -101,13 +102,14 @@ def test_the_direct_solution(scene):
         matrix, right = system(problem, state, dt)
         exact = solved(LinearSolver(problem.free), matrix, right)
         size = np.abs(exact / problem.sizes).max()
-        for tolerance, most in ((TOLERANCE, 50), (1e-8, 150)):
+        for tolerance, most in ((TOLERANCE, 20), (1e-8, 40)):
             solver = TwoLevelSolver(problem)
             solver.tolerance = tolerance
             found = solved(solver, matrix, right)
             # The preconditioned residual falls by the tolerance; it differs from the error by how good the preconditioner
-            # is, here by up to 70 (order 3). Below 1e-6 it is what single precision leaves of the patches' solves.
-            assert np.abs((found - exact) / problem.sizes).max() < 100 * max(tolerance, 1e-6) * size
+            # is, here by up to 120 (order 3 on 2³ cells, with and without the coarse level's term). Below 1e-6 it is what
+            # single precision leaves of the patches' solves.
+            assert np.abs((found - exact) / problem.sizes).max() < 200 * max(tolerance, 1e-6) * size
             assert 1 < solver.iterations < most
             # Residuals on constrained degrees of freedom are reactions; nothing of them enters the solution.
             assert not found[~np.array(list(problem.free), bool)].any()
@@ -131,7 +133,7 @@ def test_later_solves_begin_from_what_earlier_ones_found():
     assert (solver.factorisations, solver.solves) == (2, 3)
 
 
-def test_iterations_hardly_depend_on_the_size_and_stay_bounded_in_short_steps():
+def test_iterations_hardly_depend_on_sizes_of_cells_and_steps(monkeypatch):
     counts = {}
     for n in (3, 6):
         problem = eighth(n).problem
@@ -139,13 +141,20 @@ def test_iterations_hardly_depend_on_the_size_and_stay_bounded_in_short_steps():
         strain = homogeneous_equilibrium(TABLE_2, 4.1, "3-d").J ** (1 / 3) - 1
         problem.fields.components[0].Set(strain * CF((x, y, z)))  # swollen and at rest
         state = problem.vector.copy()
-        for dt in (100.0, 0.01):
+        for dt in (100.0, 0.01, 1e-6):
             solver = TwoLevelSolver(problem)
             solved(solver, *system(problem, state, dt))
             counts[n, dt] = solver.iterations
     assert counts[6, 100.0] < counts[3, 100.0] + 5
-    # A step a ten thousandth of h²/[(2µ + λ) K] = 120 s: volume is all but preserved.
-    assert counts[6, 100.0] < counts[6, 0.01] < 50
+    # Steps of a ten thousandth, and less, of h²/[(2µ + λ) K] = 120 s: volume is all but preserved.
+    for dt in (0.01, 1e-6):
+        assert counts[6, dt] < counts[6, 100.0] + 6
+        assert counts[6, dt] < counts[3, dt] + 3
+    # Without what stands for the finer displacements they double.
+    monkeypatch.setattr("ngswell.solve.coarse.softness", lambda stiffness: 0 * stiffness)
+    solver = TwoLevelSolver(problem)
+    solved(solver, *system(problem, state, 0.01))
+    assert solver.iterations > 1.6 * counts[6, 0.01]
 
 
 def test_newtons_method_takes_it():
@@ -159,8 +168,38 @@ def test_newtons_method_takes_it():
         assert outcome.failure is None
         counts.append(outcome.iterations)
         ends.append(problem.vector / problem.sizes)
-    assert counts[0] == counts[1]
+    assert counts[0] <= counts[1] <= counts[0] + 1  # a solve leaves 1e-3 of a correction
     np.testing.assert_allclose(ends[1], ends[0], atol=1e-8)  # Newton's tolerance
+
+
+class Tiring(LinearSolver):
+    """Gives no solution after so many with a matrix."""
+
+    most = 2
+
+    def factorise(self, matrix):
+        self.given = 0
+        return super().factorise(matrix)
+
+    def invert(self, right, solution):
+        self.given += 1
+        return super().invert(right, solution) and self.given <= self.most
+
+
+@pytest.mark.parametrize(("most", "reason"), [(2, None), (0, Reason.SINGULAR)])
+def test_newtons_method_renews_a_kept_matrix_that_gives_no_solution(most, reason):
+    scene = eighth(2)
+    problem = scene.problem
+    problem.vector[:] = swollen(scene)
+    problem.begin_step(10.0, 10.0)
+    solver = Tiring(problem.free)
+    solver.most = most
+    factorisation = Factorisation(solver, slowest=0.9)
+    outcome = DampedNewton(slowest=0.9).solve(problem, factorisation)
+    assert (outcome.failure and outcome.failure.reason) == reason
+    assert solver.factorisations > 1 or reason
+    if reason:
+        assert not factorisation.usable  # the next solve begins with a matrix of its own
 
 
 def test_failures_are_told():
