@@ -131,10 +131,10 @@ class Adaptive:
     is then within three times the tolerance of its largest change, as measured on random scenes. Estimates of the other
     fields are held below the same share of their largest change, or of a tenth of the displacement's in natural sizes,
     whichever is larger. The error is that of the embedded solution times a factor of safety; in the step after a kink,
-    where it is far too low in thin layers, ten times as large a one for the displacement. On the free-swelling block pressures
-    and concentrations are off by up to nine tolerances at the end of that step, by one and a half after the next. With
-    backward Euler, whose error is the difference to linear extrapolation, scaled, the tolerance bounds what one step adds, and
-    the error reached goes with its root. Changes below 1e-7 of a natural size count as round-off.
+    where it is far too low in thin layers, ten times as large a one for the displacement. On the free-swelling block
+    pressures and concentrations are off by up to nine tolerances at the end of that step, by one and a half after the next.
+    With backward Euler, whose error is the difference to linear extrapolation, scaled, the tolerance bounds what one step
+    adds, and the error reached goes with its root. Changes below 1e-7 of a natural size count as round-off.
     """
 
     tolerance: float = 1e-3
