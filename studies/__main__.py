@@ -22,6 +22,7 @@ STUDIES = {
     "hard_cases": "studies.hard_cases.run",
     "iteration": "studies.choices.iteration",
     "reductions": "studies.choices.reductions",
+    "scaling": "studies.choices.scaling",
     "speed_error": "studies.choices.speed_error",
     "stability": "studies.choices.stability",
     "tolerance": "studies.choices.tolerance",
