@@ -7,7 +7,7 @@ import os
 import re
 import zipfile
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from glob import escape
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from ngswell.checks import short
 from ngswell.errors import InputError, OutputError
+from ngswell.team import ALONE, Team
 
 try:
     import fcntl
@@ -53,13 +54,22 @@ def replacing(path: Path, what: str) -> Iterator[Path]:
 
 
 @contextmanager
-def alone(path: Path, what: str, names: str | None = None) -> Iterator[None]:
+def alone(path: Path, what: str, names: str | None = None, team: Team = ALONE) -> Iterator[None]:
     """Nothing else writes `path` meanwhile, in no process or thread; raises OutputError if something does already.
+
+    Of a `team` the first rank holds the lock for all.
 
     The lock is the system's, on a file ".NAME.lock", and ends with the process, however that ends. Where the system or the
     disk has no such locks, nothing is noticed. What a killed writer of `path` left half written, or of all files whose
     names fit the pattern `names`, is cleared away.
     """
+    with ExitStack() as held:
+        team.of_first(lambda: held.enter_context(_alone(path, what, names)))
+        yield
+
+
+@contextmanager
+def _alone(path: Path, what: str, names: str | None) -> Iterator[None]:
     target = path.resolve()
     lock = target.with_name(f".{target.name}.lock")
     held = _lock(lock, path, what)

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from ngswell import checks
 from ngswell.errors import InputError, OutputError
 from ngswell.files import REMEDY, Tree, alone, check_folder
+from ngswell.team import ALONE, Team
 
 CHUNK = 1 << 20
 """Bytes that are read at once where only their checksum counts."""
@@ -86,7 +87,8 @@ class CSV:
 class Stream:
     """What one run writes to a CSV file: `begin` or `resume`, then `write` by `write`, then `close`.
 
-    `state` is what a checkpoint keeps of it, however long the file: its size and checksum.
+    `state` is what a checkpoint keeps of it, however long the file: its size and checksum. Of a team, all call, the first
+    rank writes, and an error of it is one of all; others read the file where they see the first one's disk.
     """
 
     def __init__(self, to: CSV, what: str) -> None:
@@ -94,9 +96,14 @@ class Stream:
         self._file: FileIO | None = None
         self._held = ExitStack()
         self._size = self._sum = 0
+        self._team = ALONE
 
-    def begin(self) -> None:
+    def begin(self, team: Team = ALONE) -> None:
         """Start a new file; raises OutputError for one that exists or cannot be written."""
+        self._team = team
+        team.of_first(self._begin)
+
+    def _begin(self) -> None:
         self._hold()
         try:
             if self.to.path.exists() and not self.to.overwrite:
@@ -106,11 +113,15 @@ class Stream:
             self.close()
             raise
 
-    def resume(self, state: Tree) -> None:
+    def resume(self, state: Tree, team: Team = ALONE) -> None:
         """Go on after the lines that `state` tells of, and drop those beyond. Raises InputError where they are not there."""
+        self._team = team
+        self._size, self._sum = map(int, state["written"].tolist())
+        team.of_first(self._resume)
+
+    def _resume(self) -> None:
         self._hold()
         try:
-            self._size, self._sum = map(int, state["written"].tolist())
             if _sum_of(self.to.path, self._size) != self._sum:
                 raise InputError(
                     f"{self.what}: {self.to.path} is not as it was at the checkpoint; put it back, or start anew with "
@@ -142,6 +153,10 @@ class Stream:
 
     def write(self, entries: Sequence[object]) -> None:
         """One line, whole or not at all as long as the process lives; raises OutputError."""
+        self._size, self._sum = self._team.of_first(lambda: self._written(entries))
+
+    def _written(self, entries: Sequence[object]) -> tuple[int, int]:
+        """Size and checksum of the file with one line more."""
         assert self._file is not None
         text = StringIO()
         csv.writer(text, lineterminator="\n").writerow(entries)
@@ -154,14 +169,25 @@ class Stream:
             self._file.truncate(self._size)
             self._file.seek(self._size)
             raise self._failed(why)
-        self._size += len(line)
-        self._sum = crc32(line, self._sum)
+        return self._size + len(line), crc32(line, self._sum)
 
     def state(self) -> Tree:
         """Size [bytes] and checksum of what was written, once it is on the disk."""
+        self._team.of_first(self._to_disk)
+        return {"written": np.array([self._size, self._sum])}
+
+    def _to_disk(self) -> None:
         if self._file is not None:
             os.fsync(self._file.fileno())
-        return {"written": np.array([self._size, self._sum])}
+
+    def there(self) -> CSV:
+        """The file, to be read. Raises InputError on a rank that does not see what the first one has written."""
+        if self._team.rank > 0 and _sum_of(self.to.path, self._size) != self._sum:
+            raise InputError(
+                f"{self.what}: rank {self._team.rank} does not find in {self.to.path} what the first rank has written; ask "
+                "for it on the first rank alone, or write to a disk that all ranks share"
+            )
+        return self.to
 
     def close(self) -> None:
         if self._file is not None:

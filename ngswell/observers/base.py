@@ -15,6 +15,7 @@ from ngswell.observers.when import When
 from ngswell.problem.problem import Problem
 from ngswell.stepping.steps import Step
 from ngswell.streams import CSV
+from ngswell.team import ALONE
 
 
 class Observer:
@@ -39,6 +40,8 @@ class Observer:
     """Whether it tells itself that a state is unstable; a run then does not look."""
     used = False
     """Whether a run has started with it."""
+    team = ALONE
+    """The ranks that run it; the first writes its files."""
 
     def __init__(self, when: float | Sequence[float] | None = None, *settings: object) -> None:
         self._when = When(type(self).__name__, when)
@@ -63,8 +66,11 @@ class Observer:
         """Write the records as a table: `time [s]`, then a column for each number, with its unit in the header.
 
         Raises InputError without records, and OutputError for a file that exists (unless `overwrite`) or cannot be written.
+        Of several ranks the first writes, whether all call or it alone.
         """
         what, file = f"{type(self).__name__}.to_csv", CSV(path, overwrite)
+        if self.team.rank > 0:
+            return
         time = self.time  # which may be read from a file
         columns = self.table() if len(time) else {}
         if not columns:

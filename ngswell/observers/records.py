@@ -20,6 +20,7 @@ from ngswell.problem.problem import Problem
 from ngswell.setup.snapshot import Snapshot
 from ngswell.stepping.steps import Step
 from ngswell.streams import CSV, Stream
+from ngswell.team import Team
 
 
 class Table:
@@ -31,9 +32,9 @@ class Table:
         self._numbers = array("d")  # of all rows, one after another; none of those in a file
         self._shapes: dict[str, tuple[int, ...]] = {}
 
-    def begin(self) -> None:
+    def begin(self, team: Team) -> None:
         if self._stream is not None:
-            self._stream.begin()
+            self._stream.begin(team)
 
     def append(self, time: float, row: Mapping[str, Any]) -> None:
         values = {name: np.asarray(value, dtype=float) for name, value in row.items()}
@@ -60,7 +61,7 @@ class Table:
         width = 1 + sum(map(prod, self._shapes.values()))
         if self._stream is None:
             return np.array(self._numbers).reshape(-1, width)
-        return np.column_stack(list(self._stream.to.read().values())) if self._shapes else np.zeros((0, width))
+        return np.column_stack(list(self._stream.there().read().values())) if self._shapes else np.zeros((0, width))
 
     @property
     def time(self) -> NDArray:
@@ -80,12 +81,12 @@ class Table:
         shapes = {name: np.array(shape, dtype=int) for name, shape in self._shapes.items()}
         return {"shapes": shapes} | ({"rows": self._rows()} if self._stream is None else self._stream.state())
 
-    def resume(self, state: Tree) -> None:
+    def resume(self, state: Tree, team: Team) -> None:
         self._shapes = {name: tuple(shape.tolist()) for name, shape in state["shapes"].items()}
         if self._stream is None:
             self._numbers = array("d", state["rows"].ravel().tolist())
         else:
-            self._stream.resume(state)
+            self._stream.resume(state, team)
 
     def close(self) -> None:
         if self._stream is not None:
@@ -146,7 +147,7 @@ class Recorder(Observer):
 
     def start(self, problem: Problem, begin: float, until: float) -> None:
         self.prepare(problem, begin, until)
-        self._table.begin()
+        self._table.begin(problem.team)
         try:
             self._record_if_due(problem, begin)
         except BaseException:
@@ -155,7 +156,7 @@ class Recorder(Observer):
 
     def resume(self, problem: Problem, begin: float, until: float, state: Tree) -> None:
         self.prepare(problem, begin, until)
-        self._table.resume(state)
+        self._table.resume(state, problem.team)
         self.restore(state)
 
     def plan(self, begin: float, until: float) -> list[float]:

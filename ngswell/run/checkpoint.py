@@ -12,6 +12,7 @@ from ngswell.errors import OutputError
 from ngswell.files import alone, check_folder
 from ngswell.observers.when import When
 from ngswell.run.restart import Restart, read_checkpoint
+from ngswell.team import ALONE, Team
 
 
 class Checkpoint:
@@ -39,23 +40,28 @@ class Checkpoint:
         self._requested = False
         self._saved: float | None = None
         self._clock = 0.0
+        self._team = ALONE
 
     @contextmanager
-    def alone(self) -> Iterator[None]:
+    def alone(self, team: Team = ALONE) -> Iterator[None]:
         """No other run keeps its checkpoint there meanwhile. Raises OutputError for one that does, and for a folder that
-        cannot be written to."""
+        cannot be written to. Until the end, the first rank of the `team` reads and writes for all."""
+        self._team = team
+        team.of_first(self._check_place)
+        with alone(self.path, "Checkpoint", team=team):
+            yield
+
+    def _check_place(self) -> None:
         check_folder(self.path.resolve().parent, "Checkpoint")
         if self.path.is_dir():
             raise OutputError(f"Checkpoint: {self.path} is a folder; choose another name")
-        with alone(self.path, "Checkpoint"):
-            yield
 
     def read(self) -> Restart | None:
         """What the run is to go on from; None if there is no file yet, or if it is to be replaced.
 
         Raises InputError for a file that is no checkpoint.
         """
-        return read_checkpoint(self.path) if self.path.exists() and not self.overwrite else None
+        return self._team.of_first(lambda: read_checkpoint(self.path) if self.path.exists() and not self.overwrite else None)
 
     def request(self) -> None:
         """Write after the present step. For signal handlers and other threads."""
@@ -68,8 +74,9 @@ class Checkpoint:
     def check(self, resumed: Restart | None) -> None:
         """Refuse a file that the run does not go on from."""
         file = None if resumed is None else resumed.file
-        own = file is not None and self.path.exists() and self.path.samefile(file)
-        if self.path.exists() and not (own or self.overwrite):
+        exists = self._team.of_first(self.path.exists)
+        own = exists and file is not None and self._team.of_first(lambda: self.path.samefile(file))
+        if exists and not (own or self.overwrite):
             raise OutputError(
                 f"Checkpoint: {self.path} exists, but the run is to go on from something else; leave resume out to go on "
                 "from the file, choose another name or pass overwrite=True"
@@ -79,7 +86,8 @@ class Checkpoint:
     def after(self, time: float, write: Callable[[], Restart]) -> None:
         """Called after the accepted step to `time` [s]; `write` tells what to write."""
         at_time = self._when.value is not None and self._when.due(time)
-        if self._requested or at_time or perf_counter() - self._clock >= self.every:
+        late = self._team.rank == 0 and perf_counter() - self._clock >= self.every  # clocks of ranks differ
+        if at_time or self._team.any(self._requested or late):
             self.save(write)
 
     def save(self, write: Callable[[], Restart]) -> None:
@@ -87,6 +95,6 @@ class Checkpoint:
         self._requested = False
         restart = write()
         if restart.snapshot.time != self._saved:
-            restart.write(self.path)
+            self._team.of_first(lambda: restart.write(self.path))
             self._saved = restart.snapshot.time
         self._clock = perf_counter()

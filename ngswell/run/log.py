@@ -11,6 +11,7 @@ from ngswell.files import Tree
 from ngswell.stepping.steps import StepReport
 from ngswell.stepping.tally import Tally
 from ngswell.streams import CSV, Stream
+from ngswell.team import ALONE, Team
 
 HEADER = ("time [s]", "dt [s]", "iterations [-]", "error [-]", "rejected")
 
@@ -24,16 +25,16 @@ class StepLog:
         self._stream = None if file is None else Stream(file, "run: log")
         self._steps: list[StepReport] = []
 
-    def begin(self, earlier: tuple[StepReport, ...], state: Tree) -> None:
+    def begin(self, earlier: tuple[StepReport, ...], state: Tree, team: Team = ALONE) -> None:
         """Start with the `earlier` steps of the run, or from the `state` in which a checkpoint found the file."""
         if self._stream is None:
             if state:
                 raise InputError("resume: the run before kept its steps in a file; give it as log= again")
         elif state:
             self.tally.restore(state["tally"])
-            self._stream.resume(state)
+            self._stream.resume(state, team)
         else:
-            self._stream.begin()
+            self._stream.begin(team)
             self._stream.write(HEADER)
         for step in earlier:
             self.append(step)
@@ -49,7 +50,7 @@ class StepLog:
     @property
     def steps(self) -> tuple[StepReport, ...]:
         """All accepted steps, read from the file if they are there. Raises InputError where that was lost or damaged."""
-        return tuple(self._steps) if self._stream is None else tuple(map(_from_row, list(self._stream.to.rows())[1:]))
+        return tuple(self._steps) if self._stream is None else tuple(map(_from_row, list(self._stream.there().rows())[1:]))
 
     @property
     def kept(self) -> tuple[StepReport, ...]:

@@ -59,7 +59,8 @@ def run(
     if checkpoint is not None:
         checks.instance("checkpoint", checkpoint, Checkpoint, "a Checkpoint(path)")
     steps_taken = StepLog(log)
-    with nullcontext() if checkpoint is None else checkpoint.alone(), closing(steps_taken), team_of(setup.ranks).settled():
+    team = team_of(setup.ranks)
+    with nullcontext() if checkpoint is None else checkpoint.alone(team), closing(steps_taken), team.settled():
         return _run(setup, until, method, watch, resume, checkpoint, steps_taken)
 
 
@@ -78,7 +79,7 @@ def _run(
     start.apply(problem)
     with _settings(problem), Signals(checkpoint is not None, problem.team) as signals, watch:
         watch.start(problem, start.begin, start.time, start.until, start.remembered)
-        steps.begin(*start.logged)
+        steps.begin(*start.logged, problem.team)
         stepper = method.stepper(problem, timetable, start.restart)
         guard = Guard(method.unstable, watch, problem, stepper.factorisation.solver, timetable.duration)
         overlaps = OverlapWatch(problem)

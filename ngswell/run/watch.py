@@ -41,6 +41,7 @@ class Watch:
         self._problem = problem
         states = iter(remembered)
         for observer in self.observers:
+            observer.team = problem.team
             if remembered and observer.remembers:
                 observer.resume(problem, begin, until, next(states)[1])
             else:

@@ -543,7 +543,7 @@ def test_a_vtk_piece_that_is_cut_short_is_noticed(tmp_path, monkeypatch):
         def __init__(self, mesh, coefs, names, filename, subdivision):
             self.filename = filename
 
-        def Do(self):
+        def Do(self, drawelems):
             Path(self.filename + ".vtu").write_bytes(b"<VTKFile> half")
 
     scene = strip(cells=(1, 2))
