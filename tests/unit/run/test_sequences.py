@@ -144,13 +144,16 @@ def test_one_run_keeps_a_checkpoint_at_a_time(tmp_path):
 def test_a_series_leaves_its_neighbours_alone(tmp_path):
     scene = strip(cells=(1, 2))
     scene.run(1.0, Fixed(1.0), [VTK(tmp_path / "run_stepped"), VTK(tmp_path / "run")])
+    for old in ("run.pvtu", "run_piece1.vtu", "run_step00007_piece0.vtu"):  # of a run on ranks
+        (tmp_path / old).touch()
     scene.run(1.0, Fixed(1.0), [VTK(tmp_path / "run", overwrite=True)])
     names = [name + end for name in ("run", "run_stepped") for end in (".pvd", ".vtu", "_step00001.vtu")]
     assert sorted(file.name for file in tmp_path.iterdir()) == sorted(names)
     with pytest.raises(OutputError, match="another run or observer is writing"):
         scene.run(1.0, Fixed(1.0), [VTK(tmp_path / "new"), VTK(tmp_path / "new", overwrite=True)])
-    with pytest.raises(InputError, match="piece of another series"):
-        VTK(tmp_path / "run_step00001")
+    for name in ("run_step00001", "run_piece1"):
+        with pytest.raises(InputError, match="piece of another series"):
+            VTK(tmp_path / name)
 
 
 def test_a_link_stays_a_link(tmp_path):
