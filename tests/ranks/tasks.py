@@ -39,7 +39,7 @@ from ngswell import (
     rectangle,
 )
 from ngswell.solve.rows import Rows
-from tests.ranks.scenes import SCENES
+from tests.ranks.scenes import SCENES, cube
 from tests.scenes import FALLING, quarter, strip
 
 
