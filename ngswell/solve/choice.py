@@ -7,7 +7,7 @@ from ngswell.problem.problem import Problem
 from ngswell.solve.direct import CondensedSolver, LinearSolver
 from ngswell.solve.factors import best_solver
 from ngswell.solve.petsc import PETScSolver
-from ngswell.solve.petsc_factors import why_not_for
+from ngswell.solve.petsc_factors import why_not, why_not_for
 
 
 def solver_of(problem: Problem) -> LinearSolver:
@@ -25,8 +25,8 @@ def solver_over(problem: Problem, condensed: Form | None) -> LinearSolver:
 
 
 def solver_said(problem: Problem) -> str:
-    """The same in words."""
+    """The same in words, as far as this rank knows: one may ask alone."""
     if problem.team.alone:
         return best_solver()
-    missing = why_not_for(problem.team)
+    missing = why_not()
     return "MUMPS by PETSc, on all ranks" if missing is None else f"{best_solver()}, on the first rank alone ({missing})"
