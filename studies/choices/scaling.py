@@ -240,6 +240,8 @@ def draw(by_solver: dict[str, list[Told]], grown: Sequence[Told]) -> Figure:
     for ax, title, label in zip((time, peak, said, far), titles, labels, strict=True):
         finish(ax, title, label, RANKS if ax is not far else (1, 4, *FAR))
     peak.set(yscale="linear", ylim=(0, None))
+    time.set_ylim(top=4 * time.get_ylim()[1])  # room for what curves are
+    time.legend(fontsize=7, ncols=2, loc="upper right")
     letter_panels(axes.flat)
     return figure
 
