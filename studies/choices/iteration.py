@@ -176,7 +176,7 @@ FILLS = (("0.15", ""), ("0.95", ""), ("0.35", ""), ("0.6", "////"), ("0.85", "..
 
 def draw(costs: Sequence[IterationCost], cells: Sequence[tuple[int, int]]) -> Figure:
     """Parts of an iteration with its own matrix, and the mean iteration of the run, a panel a mesh."""
-    figure, axes = plt.subplots(1, len(cells), figsize=(8.4, 3.6))
+    figure, axes = plt.subplots(1, len(cells), figsize=(9.6, 3.6))
     meshes = list(dict.fromkeys(c.mesh for c in costs))
     for ax, mesh, (nx, ny) in zip(axes, meshes, cells, strict=True):
         mine = [c for c in costs if c.mesh == mesh]
@@ -187,7 +187,7 @@ def draw(costs: Sequence[IterationCost], cells: Sequence[tuple[int, int]]) -> Fi
             bottom = [low + height for low, height in zip(bottom, heights, strict=True)]
         ax.plot(range(len(mine)), [c.found()["iteration_ms"] for c in mine], "kD", mfc="w", label="mean of the run")
         labels = [f"{c.model.capitalize()}\n{'C++' if c.compiled else 'bytecode'}" for c in mine]
-        ax.set_xticks(range(len(mine)), labels, fontsize=8)
+        ax.set_xticks(range(len(mine)), labels, fontsize=7)
         ax.set(title=f"{nx} × {ny} cells", ylabel="time of an iteration [ms]", xlim=(-0.6, len(mine) - 0.4))
         ax.grid(False, axis="x")
     letter_panels(axes)
