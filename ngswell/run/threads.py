@@ -18,10 +18,19 @@ Within `with ngsolve.TaskManager():` a run of any size takes several.
 
 
 def threads_for(problem: Problem) -> AbstractContextManager[object]:
-    """NGSolve's threads, all that NGS_NUM_THREADS allows, for a problem of THREADS_FROM unknowns or more."""
-    return TaskManager() if problem.space.ndof >= THREADS_FROM else nullcontext()
+    """NGSolve's threads, all that NGS_NUM_THREADS allows, for a problem of THREADS_FROM unknowns or more on one rank.
+
+    Several ranks take one thread each, as they are started on a core each.
+    """
+    return TaskManager() if _takes_several(problem) else nullcontext()
 
 
 def threads_said(problem: Problem) -> str:
     """The same in words."""
-    return f"{ngsglobals.numthreads}" if problem.space.ndof >= THREADS_FROM else f"1 (more from {THREADS_FROM} unknowns on)"
+    if _takes_several(problem):
+        return f"{ngsglobals.numthreads}"
+    return f"1 (more from {THREADS_FROM} unknowns on)" if problem.team.alone else "1 on each rank"
+
+
+def _takes_several(problem: Problem) -> bool:
+    return problem.team.alone and problem.space.ndof >= THREADS_FROM

@@ -1,5 +1,8 @@
 """Threads of a run: from a size on, or where the user asks for them."""
 
+from contextlib import nullcontext
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from ngsolve import GetNumThreads, SetNumThreads, TaskManager, ngsglobals
@@ -45,3 +48,9 @@ def test_a_task_manager_around_a_small_run_is_its_own():
         run(seen)
         assert GetNumThreads() == 2
     assert set(seen) == {2}
+
+
+def test_ranks_take_a_thread_each():
+    many = SimpleNamespace(team=SimpleNamespace(alone=False), space=SimpleNamespace(ndof=10 * threads.THREADS_FROM))
+    assert threads.threads_said(many) == "1 on each rank"
+    assert isinstance(threads.threads_for(many), nullcontext)
