@@ -53,10 +53,13 @@ class Team:
 
     def sum_values(self, values: NDArray) -> None:
         """Values become their sums over all ranks, in place: the same to the bit on each."""
+        self._reduce(values, "SUM")
+
+    def _reduce(self, values: NDArray, operation: str) -> None:
         if not self.alone:
             from mpi4py import MPI
 
-            self.comm.Allreduce(MPI.IN_PLACE, values)
+            self.comm.Allreduce(MPI.IN_PLACE, values, getattr(MPI, operation))
 
     def sum(self, vector: BaseVector) -> None:
         """The same of a vector."""
@@ -69,17 +72,11 @@ class Team:
 
     def least_values(self, values: NDArray) -> None:
         """Values become the least of all ranks, in place."""
-        if not self.alone:
-            from mpi4py import MPI
-
-            self.comm.Allreduce(MPI.IN_PLACE, values, MPI.MIN)
+        self._reduce(values, "MIN")
 
     def most_values(self, values: NDArray) -> None:
         """The same with the greatest."""
-        if not self.alone:
-            from mpi4py import MPI
-
-            self.comm.Allreduce(MPI.IN_PLACE, values, MPI.MAX)
+        self._reduce(values, "MAX")
 
     def handed_over(self, values: NDArray, to: NDArray, of: NDArray) -> NDArray:
         """What the others have for this rank, in their order, when `values` are for them: as many as `to` and `of` say."""

@@ -11,6 +11,7 @@ from ngswell.problem.problem import Problem
 from ngswell.solve.direct import LinearSolver
 from ngswell.solve.factors import Factors
 from ngswell.solve.gathered import Gathered
+from ngswell.solve.pattern import rows_and_columns
 
 SHARE = 0.5
 """Of what finer displacements leave. Alone each leaves more than together with its neighbours. With 0.25, 0.5 and 1 a step
@@ -64,15 +65,15 @@ class CoarseFactors:
         self.whole, self._dofs, self._finer = matrix, dofs, finer
         self._own = Part(matrix, dofs, dofs)
         self._down, self._up = Part(matrix, scalars, finer), Part(matrix, finer, scalars)
-        rows, columns = _entries(matrix)
+        rows, columns = rows_and_columns(matrix)
         on_diagonal = np.flatnonzero(rows == columns)
         self._diagonal = on_diagonal[np.searchsorted(rows[on_diagonal], finer)]
-        self._rows_up = _entries(self._up.matrix)[0]
+        self._rows_up = rows_and_columns(self._up.matrix)[0]
 
         at, size = np.searchsorted(dofs, scalars), dofs.size
         term = self._down.matrix @ self._up.matrix  # kept, as its entries are views
-        term_rows, term_columns = _entries(term)
-        keys = [_keys(*_entries(self._own.matrix), size), _keys(at[term_rows], at[term_columns], size)]
+        term_rows, term_columns = rows_and_columns(term)
+        keys = [_keys(*rows_and_columns(self._own.matrix), size), _keys(at[term_rows], at[term_columns], size)]
         rows, columns = np.divmod(np.union1d(*keys), size)
         self._matrix = SparseMatrixd.CreateFromCOO(
             rows.astype(np.int32), columns.astype(np.int32), np.zeros(rows.size), size, size
@@ -123,7 +124,7 @@ class Part:
     def __init__(self, matrix: BaseMatrix, rows: NDArray, columns: NDArray) -> None:
         at_row, at_column = (np.full(matrix.height, -1, np.int32) for _ in range(2))
         at_row[rows], at_column[columns] = np.arange(rows.size), np.arange(columns.size)
-        row, column = (at[of] for at, of in zip((at_row, at_column), _entries(matrix), strict=True))
+        row, column = (at[of] for at, of in zip((at_row, at_column), rows_and_columns(matrix), strict=True))
         mine = np.flatnonzero((row >= 0) & (column >= 0))
         self._entries: NDArray = mine.astype(np.int32 if row.size < 2**31 else np.int64)
         self.matrix = SparseMatrixd.CreateFromCOO(row[mine], column[mine], np.zeros(mine.size), rows.size, columns.size)
@@ -152,13 +153,6 @@ def _kinds(problem: Problem) -> tuple[NDArray, NDArray, NDArray, NDArray]:
 
 def _values(matrix: BaseMatrix) -> NDArray:
     return np.asarray(matrix.CSR()[0])
-
-
-def _entries(matrix: BaseMatrix) -> tuple[NDArray, NDArray]:
-    """Row and column of each entry, row by row; columns ascend."""
-    _, columns, starts = (np.asarray(part) for part in matrix.CSR())
-    lengths = (starts[1:] - starts[:-1]).astype(np.intp)
-    return np.repeat(np.arange(matrix.height, dtype=np.int32), lengths), columns
 
 
 def _keys(rows: NDArray, columns: NDArray, size: int) -> NDArray:

@@ -8,6 +8,8 @@ import numpy as np
 from ngsolve import BaseMatrix, BaseVector, BitArray
 from numpy.typing import NDArray
 
+from ngswell.solve.pattern import rows_and_columns
+
 
 def at(array: NDArray) -> c_void_p:
     """Where an array begins."""
@@ -20,10 +22,10 @@ class FreePart:
     """
 
     def __init__(self, matrix: BaseMatrix, free: BitArray) -> None:
-        self._all, columns, starts = (np.asarray(part) for part in matrix.CSR())  # a view, of what it holds at any time
-        self._matrix = matrix
+        self._all = np.asarray(matrix.CSR()[0])  # a view, of what it holds at any time
+        self._matrix, (rows, columns) = matrix, rows_and_columns(matrix)
         mine = np.array(list(free), dtype=bool)
-        number, rows = np.cumsum(mine) - 1, np.repeat(np.arange(mine.size), np.diff(starts).astype(np.intp))
+        number = np.cumsum(mine) - 1
         self._dofs, self._entries = np.flatnonzero(mine), np.flatnonzero(mine[rows] & mine[columns])
         counts = np.bincount(number[rows[self._entries]], minlength=self._dofs.size)
         self.starts = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)

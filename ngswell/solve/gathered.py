@@ -10,6 +10,7 @@ from ngsolve.la import SparseMatrixd
 from numpy.typing import NDArray
 
 from ngswell.solve.factors import Factors
+from ngswell.solve.pattern import rows_and_columns
 from ngswell.team import Team
 
 
@@ -29,13 +30,12 @@ class Gathered:
         needed: Callable[[NDArray, NDArray], NDArray] | None = None,
     ) -> None:
         self._share, self._team = share, team
-        columns, starts = (np.asarray(part) for part in share.CSR()[1:])
-        rows = np.repeat(np.arange(share.height), np.diff(starts).astype(np.intp))
+        rows, columns = rows_and_columns(share)
         mine = np.array(list(free), dtype=bool)
         self._unknowns = np.flatnonzero(mine)
         self._entries = np.flatnonzero(mine[rows] & mine[columns] if needed is None else needed(rows, columns))
         numbers = rows[self._entries].astype(np.int64) * share.width + columns[self._entries]
-        shares = [numbers] if team.alone else team.comm.gather(numbers)
+        shares = team.comm.gather(numbers)
         self._sizes = team.each(self._entries.size)
         self._factors: Factors | None = None
         if team.rank == 0:

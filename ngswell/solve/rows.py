@@ -6,6 +6,7 @@ import numpy as np
 from ngsolve import BaseMatrix, BitArray
 from numpy.typing import NDArray
 
+from ngswell.solve.pattern import rows_and_columns
 from ngswell.team import Team
 
 
@@ -18,8 +19,7 @@ class Rows:
 
     def __init__(self, share: BaseMatrix, free: BitArray, team: Team) -> None:
         self._share, self._team = share, team
-        columns, starts = (np.asarray(part) for part in share.CSR()[1:])
-        rows = np.repeat(np.arange(share.height), np.diff(starts).astype(np.intp))
+        rows, columns = rows_and_columns(share)
         mine = np.array(list(free), dtype=bool)
         entries = np.flatnonzero(mine[rows] & mine[columns])
         rows, columns = rows[entries], columns[entries]
